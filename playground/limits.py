@@ -1,0 +1,29 @@
+"""Every limit of the playground, in one table. Nothing else in the code base states one of these numbers."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    fps: int = 20  # frame rate of every motion inside the playground
+    max_frames: int = 196  # longest motion a tokenizer sees, feature rows at 20 fps (systems.md A1)
+    min_frames: int = 16  # shortest motion that is tokenized, feature rows at 20 fps
+    min_source_frames: int = 4  # shortest uploaded clip
+    max_source_frames: int = 12_000  # longest uploaded clip, frames at its own rate
+    max_source_joints: int = 120  # joints of an uploaded skeleton
+    max_upload_bytes: int = 20 * 1024 * 1024  # size of an uploaded file, also after decompression of its arrays x8
+    max_fps: float = 1_000.0  # frame rate an uploaded file may claim
+    max_metres: float = 200.0  # farthest any joint may be from the origin, in metres after unit detection
+    max_prompt_chars: int = 500  # characters of a prompt or caption
+    max_text_positions: int = 77  # word pieces a text encoder returns (systems.md A5)
+    min_seconds: float = 1.0  # shortest generated motion
+    max_seconds: float = 9.8  # longest generated motion (196 frames)
+    max_seed: int = 2**31 - 1
+    max_guidance: float = 6.0  # largest g of the detokenizer, and largest s of the generator
+    max_json_bytes: int = 2 * 1024 * 1024  # size of a token file
+    max_figures: int = 6  # figures on one stage
+    queue_size: int = 20  # visitors waiting for the model
+    deadline_seconds: float = 30.0  # one live request, checked at every scale
+
+
+LIMITS = Limits()
