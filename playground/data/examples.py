@@ -70,7 +70,9 @@ class StoredExample:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise PlaygroundError(f"example {self.id!r} has the kind {self.kind!r}; one of {', '.join(KINDS)} is accepted")
+            raise PlaygroundError(
+                f"example {self.id!r} has the kind {self.kind!r}; one of {', '.join(KINDS)} is accepted"
+            )
         if self.joints is None and self.tokens is None:
             raise PlaygroundError(f"example {self.id!r} holds neither joints nor tokens; it needs one of them")
         if self.kind == "decoded clip" and (self.joints is not None or self.tokens is None):
@@ -79,7 +81,9 @@ class StoredExample:
             wanted = [self.frames, HUMAN22.size, 3]
             raise PlaygroundError(f"example {self.id!r} needs joints {wanted}, got {list(self.joints.shape)}")
         if not 1 <= self.frames <= LIMITS.max_frames:
-            raise PlaygroundError(f"example {self.id!r} has {self.frames} frames; 1 to {LIMITS.max_frames} are accepted")
+            raise PlaygroundError(
+                f"example {self.id!r} has {self.frames} frames; 1 to {LIMITS.max_frames} are accepted"
+            )
 
     def motion(self) -> Motion:
         """The stored joints as a Motion; PlaygroundError for a decoded clip, which only a tokenizer can turn into one."""
@@ -145,7 +149,9 @@ def _entry(entry: dict[str, Any], joints: NDArray[np.float32], ids: NDArray[np.i
         if min(tokens["sizes"]) < 1 or edges[0] < 0 or edges[-1] > len(ids):
             raise ValueError("token ids outside the file")
         levels = tuple(ids[start:stop].astype(np.int64) for start, stop in pairwise(edges))
-        stored = StoredTokens(str(tokens["system"]), str(tokens["checkpoint"]), levels, tuple(map(int, tokens["codes"])))
+        stored = StoredTokens(
+            str(tokens["system"]), str(tokens["checkpoint"]), levels, tuple(map(int, tokens["codes"]))
+        )
     text = {key: str(entry[key]) for key in ("id", "title", "caption", "action", "kind", "origin")}
     return StoredExample(**text, frames=int(entry["frames"]), joints=cut, tokens=stored)
 

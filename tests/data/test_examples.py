@@ -20,14 +20,21 @@ def tokens(sizes: list[int], codes: list[int], seed: int = 0) -> StoredTokens:
 
 def example(id: str, kind: str = "synthetic", frames: int = 20, **changes: object) -> StoredExample:
     joints = np.random.default_rng(frames).normal(size=(frames, 22, 3)).astype(np.float32)
-    fields: dict[str, object] = {"title": f"Title {id}", "caption": "A person walks.", "action": "walk", "origin": "made"}
+    fields: dict[str, object] = {
+        "title": f"Title {id}",
+        "caption": "A person walks.",
+        "action": "walk",
+        "origin": "made",
+    }
     fields |= {"frames": frames, "joints": None if kind == "decoded clip" else joints}
     fields |= {"tokens": None if kind == "synthetic" else tokens([3, 6, 10], [16, 32, 300])}
     return StoredExample(id=id, kind=kind, **(fields | changes))  # type: ignore[arg-type]
 
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(st.tuples(st.sampled_from(["synthetic", "generated", "decoded clip"]), st.integers(1, 196)), max_size=6))
+@given(
+    st.lists(st.tuples(st.sampled_from(["synthetic", "generated", "decoded clip"]), st.integers(1, 196)), max_size=6)
+)
 def test_what_is_written_comes_back(tmp_path: Path, plan: list[tuple[str, int]]) -> None:
     written = [example(f"e{i}", kind, frames) for i, (kind, frames) in enumerate(plan)]
     write_examples(tmp_path, written, note="written for this project")

@@ -1,0 +1,109 @@
+"""Motions as points of a plane: t-SNE and PCA of dequantized embeddings (systems.md G1 Fig 6, I9)."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.decomposition import PCA
+from sklearn.manifold import TSNE
+from sklearn.neighbors import NearestNeighbors
+from threadpoolctl import threadpool_limits
+
+from playground.errors import PlaygroundError
+
+METHODS = ("tsne", "pca")
+PERPLEXITY = 30.0  # systems.md I9
+
+
+def motion_means(embeddings: Iterable[ArrayLike]) -> NDArray[np.float64]:
+    """One vector a motion: the mean of its dequantized embedding z_hat [T, D] over the latents. Returns [n, D]. I9."""
+    means = [np.asarray(embedding, np.float64).mean(axis=0) for embedding in embeddings]
+    return np.stack(means) if means else np.zeros((0, 0))
+
+
+class EmbeddingMap:
+    """Places n vectors in the plane.
+
+    After `fit`:
+        points_      float64 [n, 2]
+        method_      "tsne" or "pca"
+        seed_        the seed used
+        perplexity_  of t-SNE, min(30, (n - 1) / 3) and at least 1; nan for PCA
+        explained_   float64 [2], share of the variance along the two axes; nan for t-SNE
+    """
+
+    points_: NDArray[np.float64]
+    method_: str
+    seed_: int
+    perplexity_: float
+    explained_: NDArray[np.float64]
+
+    def __init__(self, perplexity: float = PERPLEXITY) -> None:
+        self.perplexity = perplexity
+
+    def fit(self, embeddings: ArrayLike, method: str = "tsne", seed: int = 0) -> "EmbeddingMap":
+        """embeddings: [n, D], n >= 1, finite. The same seed gives the same points on one machine.
+
+        t-SNE (scikit-learn: Barnes-Hut, learning rate "auto", one thread, random_state = seed) starts from PCA; in it
+        who is near whom means something, distances between groups do not. Vectors that are all equal go to the origin.
+        PlaygroundError for an unknown method, an empty set, or values that are not finite.
+        """
+        if method not in METHODS:
+            raise PlaygroundError(f"unknown map {method!r}; accepted: {', '.join(METHODS)}")
+        rows = np.asarray(embeddings, np.float64)
+        if rows.ndim != 2 or not rows.size:
+            raise PlaygroundError(f"a map needs at least one vector, as an array [n, D]; got {list(rows.shape)}")
+        if not np.isfinite(rows).all():
+            raise PlaygroundError("the embeddings hold values that are not finite; every value must be finite")
+        self.method_, self.seed_ = method, seed
+        self.perplexity_, self.explained_ = float("nan"), np.full(2, np.nan)
+        self.points_ = np.zeros((len(rows), 2))
+        if method == "tsne":
+            self.perplexity_ = max(1.0, min(self.perplexity, (len(rows) - 1) / 3))
+        size = float(np.abs(rows).max()) or 1.0  # the largest value becomes 1, so that no square overflows
+        rows = rows / size
+        if np.ptp(rows, axis=0).any():
+            with threadpool_limits(limits=1):
+                self.points_ = self._tsne(rows) if method == "tsne" else self._pca(rows) * size
+        return self
+
+    def _pca(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scores [n, 2] on the two main axes; a second column of zeros where there is only one."""
+        points, self.explained_ = _main_axes(rows)
+        return points
+
+    def _tsne(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """t-SNE of rows of which at least two differ; it starts from PCA with a spread of 1e-4 along the first axis."""
+        start = _main_axes(rows)[0]
+        start = (start / start[:, 0].std() * 1e-4).astype(np.float32)
+        model = TSNE(perplexity=self.perplexity_, init=start, learning_rate="auto", random_state=self.seed_, n_jobs=1)
+        return np.asarray(model.fit_transform(rows), np.float64)
+
+
+def _main_axes(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """PCA of rows [n, D]: scores [n, 2] and shares of the variance [2], zeros for an axis that is not there."""
+    kept = min(2, *rows.shape)
+    model = PCA(n_components=kept, svd_solver="full")
+    points, explained = np.zeros((len(rows), 2)), np.zeros(2)
+    points[:, :kept] = model.fit_transform(rows)
+    explained[:kept] = model.explained_variance_ratio_
+    return points, explained
+
+
+def neighbour_agreement(embeddings: ArrayLike, labels: Sequence[str], k: int = 10) -> tuple[float, float]:
+    """How well groups hold together in the full space: (agreement, chance).
+
+    agreement: mean over vectors of the share of their k nearest others (Euclidean, [n, D]) with the same label; chance:
+    what shuffled labels give on average. k is cut to n - 1; both nan if n < 2. A picture of t-SNE can flatter or hide
+    groups; this number cannot.
+    """
+    rows, names = np.asarray(embeddings, np.float64), np.asarray(labels)
+    if rows.ndim != 2 or len(rows) != len(names):
+        raise PlaygroundError(f"one label a vector is needed, got {len(names)} labels for {list(rows.shape)}")
+    n = len(rows)
+    if n < 2:
+        return float("nan"), float("nan")
+    k = min(k, n - 1)
+    near = NearestNeighbors(n_neighbors=k).fit(rows).kneighbors(return_distance=False)  # (n, k), others only
+    counts = np.unique(names, return_counts=True)[1].astype(np.float64)
+    return float(np.mean(names[near] == names[:, None])), float(np.sum(counts * (counts - 1)) / (n * (n - 1)))
