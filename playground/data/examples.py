@@ -7,7 +7,7 @@ On disk an example library is a folder with two files:
 
     entry = {"id", "title", "caption", "action", "kind", "origin", "frames",
              "joints": [start, stop] | null,                                 # rows of `joints`
-             "tokens": {"system", "checkpoint", "sizes", "codes", "start"} | null}   # `sizes` ids per level from `start`
+             "tokens": {"system", "checkpoint", "sizes", "codes", "start"} | null}   # `sizes` ids a level from `start`
 
 `kind` is one of KINDS. A synthetic motion has joints; a generated one has joints and tokens; a decoded clip has tokens
 alone, and the motion is decoded from them on the fly, so no recorded motion is stored.
@@ -46,7 +46,7 @@ class StoredTokens:
     def __post_init__(self) -> None:
         if not self.ids or len(self.ids) != len(self.codes):
             raise PlaygroundError(
-                f"a token sequence needs one codebook size a level, got {len(self.ids)} levels and {len(self.codes)} sizes"
+                f"a token sequence needs a codebook size for every level, got {len(self.codes)} for {len(self.ids)} levels"
             )
         for level, (ids, codes) in enumerate(zip(self.ids, self.codes, strict=True), start=1):
             bad = ids.ndim != 1 or not ids.size or not 1 <= codes <= 2**15
@@ -56,7 +56,7 @@ class StoredTokens:
 
 @dataclass(frozen=True, eq=False)
 class StoredExample:
-    """One entry of the example library. joints: float32 [frames, 22, 3] metres or None; tokens or None; not both None."""
+    """One entry of the example library. joints: float32 [frames, 22, 3] metres, or None; tokens or None."""
 
     id: str
     title: str
@@ -86,7 +86,7 @@ class StoredExample:
             )
 
     def motion(self) -> Motion:
-        """The stored joints as a Motion; PlaygroundError for a decoded clip, which only a tokenizer can turn into one."""
+        """The stored joints as a Motion; PlaygroundError for a decoded clip, which a tokenizer has to decode."""
         if self.joints is None:
             raise PlaygroundError(f"example {self.id!r} is stored as tokens; decode them to get a motion")
         return Motion(self.joints, caption=self.caption, name=self.title)
