@@ -1,6 +1,6 @@
 """What a text encoder gives: TextFeatures, the TextEncoder protocol, and the identity that a checkpoint records."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -9,12 +9,15 @@ from torch import Tensor
 
 from playground.errors import PlaygroundError
 
+CHUNK = 64  # texts of similar length that one pass of an encoder takes
+
 
 @dataclass(frozen=True, eq=False)
 class TextFeatures:
     """Frozen features of B texts, padded on the right to the longest of them.
 
-    tokens: float32 [B, W, D], exactly 0 where padded. mask: bool [B, W], True where real. pooled: float32 [B, D].
+    tokens: float32 [B, W, D], 0 where padded (CLIP alone keeps its states there: systems.md A9 attends to all 77).
+    mask: bool [B, W], True where real. pooled: float32 [B, D] (CLIP: the width of its projection).
     words: the word piece behind each real token, one list a text, for hover text (special tokens included).
     """
 
@@ -35,29 +38,49 @@ class TextFeatures:
         """The same features on another device."""
         return TextFeatures(self.tokens.to(device), self.mask.to(device), self.pooled.to(device), self.words)
 
-    def select(self, rows: Sequence[int]) -> "TextFeatures":
-        """The given texts, in the given order, cut to the longest of them."""
-        index = torch.as_tensor(list(rows), dtype=torch.long, device=self.tokens.device)
-        mask = self.mask[index]
-        longest = int(mask.sum(dim=1).max()) if len(index) else 0
-        tokens = self.tokens[index, :longest]
-        return TextFeatures(tokens, mask[:, :longest], self.pooled[index], [self.words[row] for row in rows])
+
+def pad(rows: Sequence[tuple[Tensor, Tensor, Tensor, list[str]]], width: int) -> TextFeatures:
+    """B single texts, each (tokens [w, D], mask [w], pooled, words) -> TextFeatures of all of them."""
+    longest = max((len(row[0]) for row in rows), default=0)
+    tokens = torch.zeros(len(rows), longest, width)
+    mask = torch.zeros(len(rows), longest, dtype=torch.bool)
+    for line, (states, real, _, _) in enumerate(rows):
+        tokens[line, : len(states)] = states
+        mask[line, : len(real)] = real
+    pooled = torch.stack([row[2] for row in rows]) if rows else torch.zeros(0, width)
+    return TextFeatures(tokens, mask, pooled, [list(row[3]) for row in rows])
 
 
-def pad(states: Sequence[Tensor], pooled: Sequence[Tensor], words: Sequence[list[str]], width: int) -> TextFeatures:
-    """Unpadded states [w_i, D] of B texts, their pooled vectors [D] and word pieces -> TextFeatures."""
-    longest = max((len(state) for state in states), default=0)
-    tokens = torch.zeros(len(states), longest, width)
-    mask = torch.zeros(len(states), longest, dtype=torch.bool)
-    for row, state in enumerate(states):
-        tokens[row, : len(state)] = state
-        mask[row, : len(state)] = True
-    stacked = torch.stack([vector.to(torch.float32) for vector in pooled]) if pooled else torch.zeros(0, width)
-    return TextFeatures(tokens, mask, stacked, [list(pieces) for pieces in words])
+def run_by_length(ids: Sequence[list[int]], pad_id: int, width: int, run: Callable[[Tensor, Tensor], Tensor]) -> Tensor:
+    """Token ids of B texts -> states float32 [B, W, D], 0 where padded; texts of similar length run together.
+
+    run: (ids int64 [b, w], mask bool [b, w]) -> states [b, w, D].
+    """
+    lengths = torch.tensor([len(row) for row in ids], dtype=torch.long)
+    states = torch.zeros(len(ids), int(lengths.max()) if len(ids) else 0, width)
+    for rows in lengths.argsort(stable=True).split(CHUNK) if len(ids) else ():  # type: ignore[no-untyped-call]
+        widest = int(lengths[rows].max())
+        part = torch.full((len(rows), widest), pad_id, dtype=torch.long)
+        for line, row in enumerate(rows.tolist()):
+            part[line, : len(ids[row])] = torch.tensor(ids[row], dtype=torch.long)
+        mask = torch.arange(widest) < lengths[rows, None]  # (b, w)
+        states[rows, :widest] = run(part, mask) * mask[..., None]
+    return states
+
+
+def length_mask(ids: Sequence[list[int]]) -> Tensor:
+    """Token ids of B texts -> bool [B, W], True where real."""
+    lengths = torch.tensor([len(row) for row in ids], dtype=torch.long)
+    return torch.arange(int(lengths.max()) if len(ids) else 0) < lengths[:, None]
+
+
+def masked_mean(tokens: Tensor, mask: Tensor) -> Tensor:
+    """tokens [B, W, D], 0 where padded; mask [B, W] -> mean over the real ones [B, D]."""
+    return tokens.sum(dim=1) / mask.sum(dim=1, keepdim=True).clamp(min=1)
 
 
 def valid_text(texts: Sequence[str]) -> list[str]:
-    """The texts as a list, without lone surrogates, which no tokenizer can read. PlaygroundError if one is no string."""
+    """The texts as a list, without lone surrogates (no tokenizer reads them). PlaygroundError if one is no string."""
     for text in texts:
         if not isinstance(text, str):
             raise PlaygroundError(f"a text encoder takes a list of strings, got {type(text).__name__}")
@@ -75,7 +98,7 @@ class EncoderId:
 
 @runtime_checkable
 class TextEncoder(Protocol):
-    """Texts -> frozen features. Implementations are deterministic, hold no state of a call and may be shared by threads."""
+    """Texts -> frozen features. Implementations are deterministic, keep no state of a call, serve threads at once."""
 
     @property
     def name(self) -> str:
@@ -103,8 +126,8 @@ def check_same(recorded: EncoderId, encoder: TextEncoder) -> None:
     given = identify(encoder)
     if given != recorded:
         raise PlaygroundError(
-            f"this checkpoint was trained with the text encoder {_describe(recorded)} and cannot read {_describe(given)};"
-            " load the encoder it was trained with"
+            f"this checkpoint was trained with the text encoder {_describe(recorded)} and cannot read"
+            f" {_describe(given)}; load the encoder it was trained with"
         )
 
 

