@@ -1,0 +1,70 @@
+"""Published motion data on disk -> one motion library: the readers by name, and `prepare`, which runs one of them."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from playground.data.library import LibraryClip, write_library
+from playground.data.sources.base import Reading, Source
+from playground.data.sources.joints_npz import read_joints_npz
+from playground.errors import PlaygroundError
+
+SOURCES: dict[str, Source] = {
+    "joints-npz": Source(read_joints_npz, True, "a folder with motions.npz and clips.jsonl"),
+}
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What `prepare` wrote: number of clips, and one sentence for everything that was left out."""
+
+    clips: int
+    notes: tuple[str, ...]
+
+
+def open_source(source: str, root: Path | None) -> Reading:
+    """Check a source and its folder; the clips are read while `Reading.clips` is consumed.
+
+    PlaygroundError for an unknown source, a folder that is missing, not expected or not what the source needs.
+    """
+    if source not in SOURCES:
+        raise PlaygroundError(f"unknown source {source!r}; one of {', '.join(SOURCES)} is accepted")
+    entry = SOURCES[source]
+    if entry.needs_root and root is None:
+        raise PlaygroundError(f"the source {source} needs a folder: {entry.what}")
+    if not entry.needs_root and root is not None:
+        raise PlaygroundError(f"the source {source} takes no folder: it reads {entry.what}")
+    if root is not None and not root.is_dir():
+        raise PlaygroundError(f"{root} is not a folder; the source {source} needs {entry.what}")
+    return entry.read(root)
+
+
+def prepare(source: str, root: Path | None, out: Path, progress: Callable[[int, int], None] | None = None) -> Prepared:
+    """Read a source and write it as a library to the folder `out`, which appears only when all of it is written.
+
+    progress: called with (clips done, clips expected). PlaygroundError as in `open_source`, for a broken file, for a
+    clip id that comes twice, and where `out` is something else than a library or an empty folder.
+    """
+    if out.exists() and not (out.is_dir() and ((out / "library.json").is_file() or not any(out.iterdir()))):
+        raise PlaygroundError(f"{out} exists and is not a motion library; name a new or empty folder")
+    reading = open_source(source, root)
+    report = (lambda done: progress(min(done, reading.total), reading.total)) if progress else None
+    partial = out.with_name(out.name + ".partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    try:
+        count = write_library(partial, _unique(reading.clips), source, report)
+        shutil.rmtree(out, ignore_errors=True)
+        partial.replace(out)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    return Prepared(count, tuple(f"{number} left out: {why}" for why, number in sorted(reading.left_out.items())))
+
+
+def _unique(clips: Iterator[LibraryClip]) -> Iterator[LibraryClip]:
+    seen: set[str] = set()
+    for clip in clips:
+        if clip.id in seen:
+            raise PlaygroundError(f"the clip id {clip.id!r} comes twice; every clip needs its own")
+        seen.add(clip.id)
+        yield clip
