@@ -58,7 +58,8 @@ def library_clip(
 ) -> LibraryClip | None:
     """Joints [F, 22, 3] in metres at 20 fps -> a canonical clip; None, counted in `left_out`, where it is not usable.
 
-    label: whatever names the action; its group becomes the clip's action. PlaygroundError for another shape.
+    label: whatever names the action; its group becomes the clip's action. A clip without captions gets an
+    empty one, which is no text to a model. PlaygroundError for another shape.
     """
     if joints.ndim != 3 or joints.shape[1:] != (HUMAN22.size, 3):
         raise PlaygroundError(
@@ -76,7 +77,7 @@ def library_clip(
     canonical = canonicalise(joints)
     if np.abs(canonical[0] - joints[0]).max() < CANONICAL:
         canonical = joints.astype(np.float32)  # the source did it already: keep its numbers, not their rounding
-    return LibraryClip(id, source, split, action_of(label), captions, canonical)
+    return LibraryClip(id, source, split, action_of(label), captions or ("",), canonical)
 
 
 def split_of(take: str) -> str:

@@ -69,7 +69,7 @@ def _arrays(path: Path) -> tuple[NDArray[np.generic], float, NDArray[np.int64]]:
         raise PlaygroundError(f"{path} is not a motion archive; it needs the arrays joints and offsets") from error
     if joints.ndim != 3 or joints.shape[1:] != (HUMAN22.size, 3) or joints.dtype.kind not in "if":
         raise PlaygroundError(
-            f"{path} holds joints {list(joints.shape)} of {joints.dtype}; numbers [frames, {HUMAN22.size}, 3] are needed"
+            f"{path} holds joints {list(joints.shape)} of {joints.dtype}; numbers [F, {HUMAN22.size}, 3] are needed"
         )
     if offsets.ndim != 1 or offsets.dtype.kind not in "iu" or len(offsets) < 2:
         raise PlaygroundError(
