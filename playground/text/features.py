@@ -58,7 +58,9 @@ def run_by_length(ids: Sequence[list[int]], pad_id: int, width: int, run: Callab
     """
     lengths = torch.tensor([len(row) for row in ids], dtype=torch.long)
     states = torch.zeros(len(ids), int(lengths.max()) if len(ids) else 0, width)
-    for rows in lengths.argsort(stable=True).split(CHUNK) if len(ids) else ():  # type: ignore[no-untyped-call]
+    order = lengths.argsort(stable=True)
+    for start in range(0, len(ids), CHUNK):
+        rows = order[start : start + CHUNK]
         widest = int(lengths[rows].max())
         part = torch.full((len(rows), widest), pad_id, dtype=torch.long)
         for line, row in enumerate(rows.tolist()):

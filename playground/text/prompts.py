@@ -26,13 +26,15 @@ def normalise(text: str, *, what: str = "prompt", allow_empty: bool = False) -> 
     spaced = " ".join(text.split())
     kept = "".join(char for char in spaced if unicodedata.category(char) not in _INVISIBLE)
     line = " ".join(kept.split())
+    if len(line) <= LIMITS.max_prompt_chars:  # composing is slow on huge nonsense, and may lengthen a text
+        line = unicodedata.normalize("NFC", line)
     if len(line) > LIMITS.max_prompt_chars:
         raise PlaygroundError(
             f"the {what} has {len(line)} characters, at most {LIMITS.max_prompt_chars} are accepted; shorten it"
         )
     if not line and not allow_empty:
         raise PlaygroundError(f'the {what} is empty; write what the person does, for example "a person walks forward"')
-    return unicodedata.normalize("NFC", line)
+    return line
 
 
 def mirror_caption(text: str) -> str:
