@@ -1,0 +1,249 @@
+"""What the commands do: check everything that can be checked at once, then call the engine."""
+
+import json
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from playground.data.library import Library
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+from playground.motion.motion import Motion
+from playground.progress import Progress
+
+if TYPE_CHECKING:
+    from playground.engine import Engine
+    from playground.tokenizers.token_file import TokenFile
+
+CLIP_FILES = (".bvh", ".npy", ".npz")
+FACTS = ("name", "tokenizer", "generator", "text", "parameters", "data", "checkpoint")
+
+
+def say(text: str) -> None:
+    """One line on stdout."""
+    sys.stdout.write(text.encode("utf-8", "replace").decode("utf-8") + "\n")
+
+
+def app(host: str, port: int) -> None:
+    """Serve the web app until it is stopped."""
+    os.environ.setdefault("GRADIO_ANALYTICS_ENABLED", "False")  # read when gradio is imported
+    from playground.ui.app import launch
+
+    launch(host, port)
+
+
+def systems(as_json: bool) -> None:
+    """Print the table of systems."""
+    rows = [{key: getattr(system, key) for key in FACTS} for system in _engine().systems()]
+    if as_json:
+        say(_json(rows))
+        return
+    for row in rows:
+        parts = [str(row[key]) for key in ("tokenizer", "generator") if row[key]]
+        say(f"{row['name']:<22} {' + '.join(parts)}, text {row['text']}, {row['parameters']:,} parameters, "
+            f"data {row['data']}, checkpoint {row['checkpoint']}")  # fmt: skip
+
+
+def tokenize(clip: str, caption: str | None, system: str, start: float, library: Path | None, to: Path | None) -> None:
+    """Motion to token file."""
+    if caption is not None:
+        _check_text(caption, "caption")
+    engine = _engine()
+    _check_system(engine, system)
+    motion, notes = find_clip(clip, start, library, engine)
+    with Progress(f"tokenizing with {system}"):
+        tokenized = engine.tokenize(motion, motion.caption if caption is None else caption, system)
+    _write_text(_token_file(tokenized, tokenized.caption, tokenized.motion.frames).to_json(), to)
+    if to:
+        for note in notes:
+            say(note)
+        count = sum(level.size for level in tokenized.levels)
+        say(f"{to}: {count} tokens in {len(tokenized.levels)} levels, {tokenized.motion.frames} frames")
+
+
+def decode(tokens: Path, caption: str | None, guidance: float, out: Path) -> None:
+    """Token file to motion file."""
+    if caption is not None:
+        _check_text(caption, "caption")
+    _check_guidance(guidance)
+    from playground.tokenizers.token_file import TokenFile
+
+    file = TokenFile.read(tokens)
+    engine = _engine()
+    _check_system(engine, file.system)
+    with Progress(f"decoding with {file.system}"):
+        decoded = engine.decode(file, caption=caption, guidance=guidance)
+    _write_motion(replace(decoded.motion, caption=file.caption if caption is None else caption), out)
+
+
+def generate(
+    prompt: str | None,
+    no_text: bool,
+    seconds: float,
+    seed: int,
+    system: str,
+    guidance: float,
+    out: Path,
+    to: Path | None,
+) -> None:
+    """Text to motion file."""
+    if no_text and prompt is not None:
+        raise PlaygroundError("a prompt and --no-text were both given; choose one")
+    if not no_text and prompt is None:
+        raise PlaygroundError("a prompt is needed; --no-text generates without one")
+    if prompt is not None:
+        _check_text(prompt, "prompt", empty=False)
+    if not LIMITS.min_seconds <= seconds <= LIMITS.max_seconds:
+        raise PlaygroundError(f"--seconds is {seconds:g}; {LIMITS.min_seconds:g} to {LIMITS.max_seconds:g} is accepted")
+    if not 0 <= seed <= LIMITS.max_seed:
+        raise PlaygroundError(f"--seed must be a whole number from 0 to {LIMITS.max_seed}")
+    _check_guidance(guidance)
+    engine = _engine()
+    _check_system(engine, system, generator=True)
+    with Progress(f"generating with {system}"):
+        made = engine.generate(prompt, seconds, system, seed=seed, guidance=guidance)
+    _write_motion(replace(made.motion, caption=prompt or ""), out)
+    if to:
+        _write_text(_token_file(made, prompt or "", made.motion.frames).to_json(), to)
+
+
+def prepare(source: str, root: Path | None, out: Path) -> None:
+    """Published data to library."""
+    from playground.data import sources
+
+    with Progress(f"preparing {source}") as progress:
+        prepared = sources.prepare(source, root, out, progress)
+    for note in prepared.notes:
+        say(note)
+    say(f"{out}: {prepared.clips} clips")
+
+
+def train(config: str, library: Path, out: Path, resume: bool, steps: int | None) -> None:
+    """Train a tokenizer or a generator."""
+    Library.open(library)
+    from playground.training import run
+
+    run.train(config, library, out, resume=resume, steps=steps)
+
+
+def evaluate(system: str, library: Path, split: str, to: Path | None) -> None:
+    """Measure a system on a split."""
+    _check_system(_engine(), system)
+    if not Library.open(library).split(split):
+        raise PlaygroundError(f"the split {split} of {library} is empty")
+    from playground.evaluation import run
+
+    with Progress(f"evaluating {system}"):
+        result = run.evaluate(system, library, split)
+    _write_text(_json(result) + "\n", to)
+    if to:
+        say(f"{to}: " + ", ".join(f"{key} {value:.1f}" for key, value in result.items() if isinstance(value, float)))
+
+
+def bench(to: Path | None) -> None:
+    """Measure speed and memory."""
+    from playground import bench as module
+
+    module.run(to)
+
+
+def find_clip(clip: str, start: float, library: Path | None, engine: "Engine") -> tuple[Motion, list[str]]:
+    """The motion that CLIP names, from `start` seconds on, cut to what a tokenizer sees, and what was done to it.
+
+    A file by its suffix; otherwise an id of the library given, or of the examples, or of the folder `library` that
+    `make train` fills. PlaygroundError if it is nowhere, broken, or shorter than `start`.
+    """
+    if start < 0:
+        raise PlaygroundError(f"--start is {start:g}; 0 or more seconds are accepted")
+    path = Path(clip)
+    if path.suffix.lower() in CLIP_FILES or path.exists():
+        from playground.motion.formats import read_motion
+
+        read = read_motion(path, start_seconds=start)
+        motion, notes = read.motion, [read.mapping, *read.changes]
+    else:
+        motion, notes = _stored_clip(clip, library, engine), []
+        if start >= motion.seconds:
+            raise PlaygroundError(f"--start is {start:g} s, but {clip} ends at {motion.seconds:g} s")
+        motion = motion.slice(int(start * motion.fps), motion.frames)
+    longest = LIMITS.max_frames + 1  # poses of the longest motion: one more than its feature rows
+    if motion.frames > longest:
+        notes.append(
+            f"cut to the first {LIMITS.max_frames / motion.fps:g} s of {motion.seconds:g} s; --start chooses others"
+        )
+        motion = motion.slice(0, longest)
+    return motion, notes
+
+
+def _stored_clip(clip: str, library: Path | None, engine: "Engine") -> Motion:
+    example = next((example for example in engine.examples() if example.id == clip), None)
+    if example is not None and library is None:
+        return example.motion()
+    folder = library or Path("library")
+    if library is not None or (folder / "library.json").is_file():
+        opened = Library.open(folder)
+        for number, entry in enumerate(opened.clips):
+            if entry.id == clip:
+                return Motion(opened.joints(number), caption=entry.captions[0], name=clip)
+    where = f"the library {folder}" if library else "the examples"
+    raise PlaygroundError(
+        f"{clip[:80]!r} is neither a {', '.join(CLIP_FILES)} file nor a clip of {where}; --library names another"
+    )
+
+
+def _engine() -> "Engine":
+    from playground.engine import default_engine
+
+    return default_engine()
+
+
+def _check_system(engine: "Engine", name: str, generator: bool = False) -> None:
+    """The same sentences as the engine's, before anything heavy is loaded."""
+    table = {system.name: system for system in engine.systems()}
+    if name not in table:
+        raise PlaygroundError(f"unknown system {name[:80]!r}; one of {', '.join(table)} is accepted")
+    if table[name].checkpoint == "absent":
+        raise PlaygroundError(f"the system {name} has no checkpoint here; train one with the train command")
+    if generator and table[name].generator is None:
+        raise PlaygroundError(f"the system {name} has no generator; it can tokenize and decode only")
+
+
+def _check_text(text: str, what: str, empty: bool = True) -> None:
+    if not empty and not text.strip():
+        raise PlaygroundError(f"the {what} is empty; describe a motion, or use --no-text")
+    if len(text) > LIMITS.max_prompt_chars:
+        raise PlaygroundError(f"the {what} has {len(text)} characters; {LIMITS.max_prompt_chars} are accepted")
+
+
+def _check_guidance(guidance: float) -> None:
+    if not 0 <= guidance <= LIMITS.max_guidance:
+        raise PlaygroundError(f"--guidance is {guidance:g}; 0 to {LIMITS.max_guidance:g} is accepted")
+
+
+def _token_file(result: Any, caption: str, frames: int) -> "TokenFile":
+    from playground.tokenizers.token_file import TokenFile
+
+    return TokenFile(result.system, result.checkpoint, caption, frames, tuple(result.levels))
+
+
+def _write_motion(motion: Motion, out: Path) -> None:
+    from playground.motion.formats import write_motion
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    for change in write_motion(motion, out):
+        say(change)
+    say(f"{out}: {motion.frames} poses, {motion.seconds:g} s")
+
+
+def _write_text(text: str, out: Path | None) -> None:
+    if out is None:
+        sys.stdout.write(text)
+        return
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(text, encoding="utf-8")
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, indent=1, ensure_ascii=False)
