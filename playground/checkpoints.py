@@ -1,0 +1,123 @@
+"""Self-describing checkpoints: one safetensors file holds half-precision weights, and its metadata says the rest.
+
+Metadata: format, kind (tokenizer | generator), config, encoder (name, width, hash of the text encoder), data, facts (steps,
+seconds, seed, validation figures). Loading needs no other file and runs no pickle.
+"""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from playground.errors import PlaygroundError
+from playground.generators.scalewise import GeneratorConfig, ScalewiseTransformer, build_generator
+from playground.motion.representation import Normaliser
+from playground.text.features import EncoderId
+from playground.tokenizers.transformer import LGTok, TokenizerConfig, build_tokenizer
+
+Model = TypeVar("Model", bound=nn.Module)
+FORMAT = "1"
+TRAINING_ONLY = ("sums", "counts", "started")  # state of the EMA codebooks, not shipped
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """What a checkpoint says of itself."""
+
+    kind: str  # tokenizer | generator
+    config: Any  # TokenizerConfig | GeneratorConfig
+    encoder: EncoderId
+    data: str  # name of the library it saw
+    facts: dict[str, Any]  # step, seconds, seed, last validation figures
+    normaliser: Normaliser | None = None  # of the tokenizer's features
+    hash: str = ""  # sha256 of the file, filled by loading
+
+
+def save_checkpoint(path: Path, model: nn.Module, card: Card) -> None:
+    """Write weights in float16 and the card, whole or not at all."""
+    tensors: dict[str, Tensor] = {
+        f"model.{name}": value.detach().cpu().half().contiguous()
+        for name, value in model.state_dict().items()
+        if name.rsplit(".", 1)[-1] not in TRAINING_ONLY
+    }
+    if card.normaliser is not None:
+        tensors["normaliser.mean"] = torch.from_numpy(card.normaliser.mean.copy())
+        tensors["normaliser.std"] = torch.from_numpy(card.normaliser.std.copy())
+    facts = {key: value for key, value in card.facts.items() if key != "validation"}
+    facts["validation"] = card.facts.get("validation", [])[-1:]
+    metadata = {
+        "format": FORMAT,
+        "kind": card.kind,
+        "config": json.dumps(asdict(card.config)),
+        "encoder": json.dumps(asdict(card.encoder)),
+        "data": card.data,
+        "facts": json.dumps(facts),
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    save_file(tensors, partial, metadata)
+    os.replace(partial, path)
+
+
+def read_card(path: Path) -> Card:
+    """The card of a checkpoint without its weights. PlaygroundError if the file is not one."""
+    return _read(path)[0]
+
+
+def load_tokenizer(path: Path) -> tuple[LGTok, Card]:
+    """A tokenizer in evaluation mode, float32, with its card. PlaygroundError if the file is not one."""
+    card, tensors = _read(path, kind="tokenizer", weights=True)
+    return _fill(build_tokenizer(card.config), tensors, path), card
+
+
+def load_generator(path: Path) -> tuple[ScalewiseTransformer, Card]:
+    """A generator in evaluation mode, float32, with its card. PlaygroundError if the file is not one."""
+    card, tensors = _read(path, kind="generator", weights=True)
+    return _fill(build_generator(card.config), tensors, path), card
+
+
+def _fill(model: Model, tensors: dict[str, Tensor], path: Path) -> Model:
+    weights = {name[6:]: value.float() for name, value in tensors.items() if name.startswith("model.")}
+    missing, unexpected = model.load_state_dict(weights, strict=False)
+    if unexpected or any(name.rsplit(".", 1)[-1] not in TRAINING_ONLY for name in missing):
+        raise PlaygroundError(f"the weights in {path} do not fit their own config; the file is damaged or too new")
+    return model.eval().requires_grad_(False)
+
+
+def _read(path: Path, kind: str | None = None, weights: bool = False) -> tuple[Card, dict[str, Tensor]]:
+    try:
+        with safe_open(str(path), framework="pt") as file:
+            metadata = file.metadata() or {}
+            if metadata["format"] != FORMAT:
+                raise PlaygroundError(f"{path} has checkpoint format {metadata['format']}, this version reads {FORMAT}")
+            names = [name for name in file.keys() if weights or name.startswith("normaliser.")]  # noqa: SIM118
+            tensors = {name: file.get_tensor(name) for name in names}
+        card = _card(metadata, tensors, hashlib.sha256(path.read_bytes()).hexdigest())
+    except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:
+        if isinstance(error, PlaygroundError):
+            raise
+        raise PlaygroundError(f"{path} is not a checkpoint of the playground (a .safetensors file with a card)") from error
+    if kind is not None and card.kind != kind:
+        raise PlaygroundError(f"{path} is a {card.kind} checkpoint, a {kind} is needed here")
+    return card, tensors
+
+
+def _card(metadata: dict[str, str], tensors: dict[str, Tensor], digest: str) -> Card:
+    kinds: dict[str, type] = {"tokenizer": TokenizerConfig, "generator": GeneratorConfig}
+    config_type = kinds[metadata["kind"]]
+    raw = json.loads(metadata["config"])
+    known = {field.name for field in fields(config_type)}
+    config = config_type(**{k: tuple(v) if isinstance(v, list) else v for k, v in raw.items() if k in known})
+    normaliser = None
+    if "normaliser.mean" in tensors:
+        normaliser = Normaliser(tensors["normaliser.mean"].numpy(), tensors["normaliser.std"].numpy())
+    encoder = EncoderId(**json.loads(metadata["encoder"]))
+    facts = json.loads(metadata["facts"])
+    return Card(metadata["kind"], config, encoder, metadata["data"], facts, normaliser, digest)

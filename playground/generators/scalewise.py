@@ -1,0 +1,271 @@
+"""Scalable autoregression (MoSa's generator as LG-Tok uses it; arXiv 2602.08337, systems.md A9-A10), from config to sampling.
+
+Every scale is drawn at once, given all coarser scales: the running sum of the de-quantized scales so far, pooled to the next
+scale's length, is the input of that scale. The loop over scales is written once (`ScalewiseGenerator.steps`).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from playground.generators.base import Step
+from playground.limits import LIMITS
+from playground.nn.attention import CrossAttention, KeyValueCache, SelfAttention
+from playground.nn.blocks import SwiGLU
+from playground.nn.norm import build_norm
+from playground.nn.rope import rope_angles
+from playground.nn.sampling import Sampling, draw, entropy_bits, guide
+from playground.text.encoders import TextFeatures
+from playground.tokenizers.base import Tokens
+from playground.tokenizers.quantizers import MultiScaleQuantizer, resample_down
+from playground.tokenizers.transformer import FULL_SCALES, MID_SCALES, linear_codes
+
+ROPE_SPAN = 64.0  # every scale's positions run from 0 to this
+
+
+@dataclass(frozen=True)
+class GeneratorConfig:
+    """Every number of the scale-wise generator; the defaults are LG-Tok's published one."""
+
+    width: int = 384
+    depth: int = 8
+    heads: int = 6
+    hidden: int = 768
+    dropout: float = 0.2
+    rope_base: float = 100.0
+    text_width: int = 512
+    text_mask: bool = False  # False: all positions of the encoder are seen, padding too (as released, with CLIP)
+    length_unit: int = 4  # frames a row of the length table
+    lengths: int = LIMITS.max_frames // 4  # rows of the length table
+    scales: tuple[int, ...] = FULL_SCALES
+    codes: tuple[int, ...] = linear_codes(256, 768, 10)
+    code_width: int = 512
+
+
+GENERATOR_PRESETS: dict[str, GeneratorConfig] = {
+    "full": GeneratorConfig(),
+    "lite": GeneratorConfig(
+        width=256, depth=6, heads=4, hidden=512, dropout=0.1, text_width=384, text_mask=True,
+        scales=MID_SCALES, codes=linear_codes(128, 384, 10), code_width=192,
+    ),
+}  # fmt: skip
+
+
+class Layer(nn.Module):
+    """Pre-norm block in the order cross-attention to text, self-attention, SwiGLU (A9)."""
+
+    def __init__(self, width: int, heads: int, hidden: int, dropout: float) -> None:
+        super().__init__()
+        self.norms = nn.ModuleList(build_norm("rms", width) for _ in range(3))
+        self.text_norm = build_norm("rms", width)
+        self.cross = CrossAttention(width, heads, dropout=dropout)
+        self.self_attention = SelfAttention(width, heads, dropout=dropout)
+        self.feed_forward = SwiGLU(width, hidden, dropout=dropout, bias=False)
+        self.dropout = dropout
+
+    def drop(self, x: Tensor) -> Tensor:
+        """Dropout at the end of a branch."""
+        return F.dropout(x, self.dropout, self.training)
+
+
+@dataclass(frozen=True, eq=False)
+class TextMemory:
+    """The text of one call, ready for every layer: keys and values of the rows with text, one constant for those without."""
+
+    keys_values: list[tuple[Tensor, Tensor]]  # a layer: [B, H, W, head width] twice; empty list without any text
+    mask: Tensor | None  # [B, W]
+    null: list[Tensor]  # a layer: [B, 1, D], what attention to the null text gives; empty list where not needed
+    length: Tensor  # [B, D], length embedding
+
+    @property
+    def branches(self) -> int:
+        """2 where rows with and without text run together, else 1."""
+        return bool(self.keys_values) + bool(self.null)
+
+
+class ScalewiseTransformer(nn.Module):
+    """The network: running sums and text in, logits of every scale out."""
+
+    def __init__(self, config: GeneratorConfig) -> None:
+        super().__init__()
+        c = self.config = config
+        self.text_proj = nn.Linear(c.text_width, c.width)
+        self.sum_proj = nn.Linear(c.code_width, c.width)
+        self.start = nn.Parameter(torch.empty(c.scales[0], c.width))
+        self.level = nn.Parameter(torch.empty(len(c.scales), c.width))
+        self.length = nn.Parameter(torch.empty(c.lengths, c.width))
+        self.layers = nn.ModuleList(Layer(c.width, c.heads, c.hidden, c.dropout) for _ in range(c.depth))
+        self.heads = nn.ModuleList(nn.Linear(c.width, v) for v in c.codes)
+        for table in (self.start, self.level, self.length):
+            nn.init.trunc_normal_(table, std=(1 / (3 * c.width)) ** 0.5)
+        self.apply(_init)
+
+    def positions(self, level: int) -> Tensor:
+        """Continuous positions [s_n] of a scale on the common axis 0..64; a single token stands at 0."""
+        return torch.linspace(0.0, ROPE_SPAN, self.config.scales[level]) if self.config.scales[level] > 1 else torch.zeros(1)
+
+    def pattern(self) -> Tensor:
+        """Boolean [1, 1, S, S]: a token sees every token of its own and of coarser scales."""
+        level = torch.repeat_interleave(torch.arange(len(self.config.scales)), torch.tensor(self.config.scales))
+        return (level[:, None] >= level[None, :])[None, None]
+
+    def remember(
+        self, text: TextFeatures | None, lengths: Tensor, *, null: bool = False, dropped: Tensor | None = None
+    ) -> TextMemory:
+        """Prepare text and lengths (int64 [B], frames) for all layers; null adds the branch without text."""
+        c = self.config
+        index = (lengths // c.length_unit - 1).clamp(0, c.lengths - 1)
+        length = self.length[index]  # (B, D)
+        prepared: list[tuple[Tensor, Tensor]] = []
+        if text is not None:
+            tokens = text.tokens if dropped is None else text.tokens * ~dropped[:, None, None]
+            states = self.text_proj(tokens) + length[:, None]
+            prepared = [layer.cross.keys_values(layer.text_norm(states)) for layer in self.layers]
+        constants: list[Tensor] = []
+        if null or text is None:
+            empty = (self.text_proj.bias + length)[:, None]
+            constants = [layer.cross.constant(layer.text_norm(empty)) for layer in self.layers]
+        mask = text.mask if text is not None and c.text_mask else None
+        return TextMemory(prepared, mask, constants, length)
+
+    def embed_sums(self, sums: Tensor, level: int) -> Tensor:
+        """Input of scale `level` > 0: running sum [B, T, code width], pooled and projected -> [B, s_n, D]."""
+        return self.sum_proj(resample_down(sums, self.config.scales[level])) + self.level[level]
+
+    def embed_start(self, length: Tensor) -> Tensor:
+        """Input of the first scale from the length embedding [B, D] -> [B, s_1, D]."""
+        return self.start[None] + length[:, None] + self.level[0]
+
+    def run(
+        self, x: Tensor, text: TextMemory, positions: Tensor, mask: Tensor | None, cache: KeyValueCache | None = None
+    ) -> Tensor:
+        """All layers on x [B * branches, S, D]; rows with text come first."""
+        rotation = rope_angles(positions.to(x.device), self.config.width // self.config.heads, self.config.rope_base)
+        for index, layer in enumerate(self.layers):
+            x = x + layer.drop(self._cross(layer, index, layer.norms[0](x), text))
+            attended = layer.self_attention(layer.norms[1](x), rotation=rotation, mask=mask, cache=cache, layer=index)
+            x = x + layer.drop(attended)
+            x = x + layer.drop(layer.feed_forward(layer.norms[2](x)))
+        return x
+
+    def _cross(self, layer: Layer, index: int, x: Tensor, text: TextMemory) -> Tensor:
+        rows = len(x) // text.branches
+        parts = []
+        if text.keys_values:
+            parts.append(layer.cross.attend(x[:rows], text.keys_values[index], text.mask))
+        if text.null:
+            parts.append(text.null[index].expand(-1, x.shape[1], -1))
+        return parts[0] if len(parts) == 1 else torch.cat(parts)
+
+    def forward(self, sums: list[Tensor], text: TextMemory) -> list[Tensor]:
+        """Teacher forcing: running sums [B, T, code width] after scales 1..N-1 -> logits [B, s_n, V_n] of every scale."""
+        inputs = [self.embed_start(text.length)]
+        inputs += [self.embed_sums(total, level) for level, total in enumerate(sums, start=1)]
+        x = torch.cat(inputs, dim=1)
+        positions = torch.cat([self.positions(level) for level in range(len(self.config.scales))])
+        x = self.run(x, text, positions, self.pattern().to(x.device))
+        return [head(part) for head, part in zip(self.heads, x.split(self.config.scales, dim=1), strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Edit:
+    """What a generation keeps: source tokens at latents where keep (bool [T]) is True, and all of the first scales."""
+
+    tokens: Tokens
+    keep: Tensor
+    forced: int = 0  # so many coarse scales are taken from the source whole
+
+    def mix(self, level: int, drawn: Tensor) -> Tensor:
+        """Drawn ids [B, s_n] with the kept positions put back; the mask is resized linearly, threshold 0.5 (A10)."""
+        source = self.tokens.ids[level]
+        if level < self.forced:
+            return source
+        redraw = (~self.keep).float()[None, None]
+        size = drawn.shape[1]
+        redraw = F.interpolate(redraw, size, mode="linear", align_corners=False)[0, 0] if len(self.keep) != size else redraw[0, 0]
+        return torch.where(redraw > 0.5, drawn, source)
+
+
+@dataclass(frozen=True, eq=False)
+class ScalewiseGenerator:
+    """The network with the quantizer whose tokens it draws; holds no state of a call."""
+
+    transformer: ScalewiseTransformer
+    quantizer: MultiScaleQuantizer = field(repr=False)
+
+    @torch.no_grad()
+    def steps(
+        self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling, edit: Edit | None = None
+    ) -> Iterator[Step]:
+        """The scale loop: yields after every scale. text None draws free-form, without guidance.
+
+        Guidance grows linearly over the scales from 0 to sampling.cfg (A10). Same seed, same tokens.
+        """
+        net, quantizer = self.transformer, self.quantizer
+        guided = text is not None and sampling.cfg != 0
+        memory = net.remember(text, lengths, null=guided)
+        cache = KeyValueCache()
+        rng = torch.Generator().manual_seed(sampling.seed)
+        total = torch.zeros(len(lengths), quantizer.length, net.config.code_width, device=lengths.device)
+        drawn: list[Tensor] = []
+        for level in range(len(quantizer.scales)):
+            if sampling.check is not None:
+                sampling.check()
+            x = net.embed_start(memory.length) if level == 0 else net.embed_sums(total, level)
+            x = torch.cat([x] * memory.branches)
+            logits = net.heads[level](net.run(x, memory, net.positions(level), None, cache))
+            if guided:
+                ramp = sampling.cfg * level / max(len(quantizer.scales) - 1, 1)
+                logits = guide(*logits.chunk(2), ramp)
+            ids = draw(logits, sampling, rng)
+            ids = ids if edit is None else edit.mix(level, ids)
+            drawn.append(ids)
+            total = total + quantizer.share(level, ids)
+            yield Step(level + 1, Tokens(tuple(drawn), quantizer.codes), total, entropy_bits(logits), logits)
+
+    def generate(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Step:
+        """The last step: all scales drawn."""
+        *_, last = self.steps(text, lengths, sampling)
+        return last
+
+    def edit(
+        self,
+        tokens: Tokens,
+        keep: Tensor,
+        text: TextFeatures | None,
+        lengths: Tensor,
+        sampling: Sampling,
+        forced: int = 0,
+    ) -> Tokens:
+        """Redraw the tokens where keep (bool [T]) is False; kept positions hold their codes at every scale (A10)."""
+        *_, last = self.steps(text, lengths, sampling, Edit(tokens, keep, forced))
+        return last.tokens
+
+    @torch.no_grad()
+    def score(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
+        """Log-probability [B, s_n] of every given token, one array a level, teacher-forced, without guidance."""
+        logits = self.transformer(running_sums(self.quantizer, tokens), self.transformer.remember(text, lengths))
+        return [
+            part.log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
+            for part, ids in zip(logits, tokens.ids, strict=True)
+        ]
+
+
+def running_sums(quantizer: MultiScaleQuantizer, tokens: Tokens) -> list[Tensor]:
+    """Sums [B, T, code width] after scales 1..N-1: what teacher forcing feeds to scales 2..N."""
+    return list(quantizer.accumulate(tokens.ids[:-1]))
+
+
+def _init(module: nn.Module) -> None:
+    if isinstance(module, nn.Linear):
+        nn.init.normal_(module.weight, std=0.02)
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)
+
+
+def build_generator(config: GeneratorConfig) -> ScalewiseTransformer:
+    """The network for a config, randomly initialised, in training mode."""
+    return ScalewiseTransformer(config)

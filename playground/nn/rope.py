@@ -1,0 +1,26 @@
+"""Rotary position embedding on interleaved pairs (2i, 2i+1): angle = position * base^(-2i / head width) (A3, A9)."""
+
+import torch
+from torch import Tensor
+
+Rotation = tuple[Tensor, Tensor]  # cos, sin, each [..., T, head width / 2]
+
+
+def rope_angles(positions: Tensor, head_width: int, base: float) -> Rotation:
+    """positions [..., T] (may be fractions) -> cos and sin [..., T, head_width / 2], float32."""
+    exponent = torch.arange(0, head_width, 2, device=positions.device, dtype=torch.float32) / head_width
+    angle = positions.float()[..., None] * base**-exponent
+    return angle.cos(), angle.sin()
+
+
+def apply_rope(x: Tensor, rotation: Rotation) -> Tensor:
+    """Rotate x [B, H, T, head width] by angles [T, head width / 2] or [B, 1, T, head width / 2]."""
+    cos, sin = (part.to(x.dtype) for part in rotation)
+    even, odd = x[..., 0::2], x[..., 1::2]
+    return torch.stack([even * cos - odd * sin, even * sin + odd * cos], dim=-1).flatten(-2)
+
+
+def sinusoid(positions: Tensor, width: int) -> Tensor:
+    """Fixed sine/cosine table for positions [T] -> [T, width]: sines in even columns, cosines in odd ones, base 10000."""
+    cos, sin = rope_angles(positions, width, 10_000.0)
+    return torch.stack([sin, cos], dim=-1).flatten(-2)

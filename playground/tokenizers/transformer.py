@@ -1,0 +1,316 @@
+"""LG-Tok's tokenizer and detokenizer (arXiv 2602.08337; systems.md A3-A8), read from config to decoding.
+
+encode: text, learned latents and motion frames go through one transformer; the latents that come out are quantized over
+growing scales. decode: frame queries look at the de-quantized latents and at the text; guidance decodes with and without
+text and extrapolates.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from playground.limits import LIMITS
+from playground.nn.attention import Memory
+from playground.nn.blocks import UStack
+from playground.nn.rope import Rotation, rope_angles
+from playground.text.encoders import TextFeatures
+from playground.tokenizers.base import Quantized, Tokens
+from playground.tokenizers.quantizers import MultiScaleQuantizer
+
+FULL_SCALES = (3, 6, 10, 15, 20, 25, 30, 36, 42, 49)  # 236 tokens
+MID_SCALES = (2, 4, 6, 9, 12, 16, 20, 25, 30, 36)  # 160 tokens
+MINI_SCALES = (1, 2, 3, 5, 7, 10, 13, 17, 21, 25)  # 104 tokens; the list itself is not published (systems.md I1)
+TextSide = Literal["both", "tokenizer", "detokenizer", "none"]
+Mixing = Literal["in-context", "cross"]
+
+
+def linear_codes(first: int, last: int, levels: int) -> tuple[int, ...]:
+    """Codebook sizes growing linearly from coarse to fine, rounded (A6: 256 to 768 over 10 scales)."""
+    return tuple(round(first + (last - first) * n / (levels - 1)) for n in range(levels))
+
+
+@dataclass(frozen=True)
+class TokenizerConfig:
+    """Every number of the LG-Tok tokenizer; the defaults are the published model."""
+
+    columns: int = 67  # feature columns C
+    max_frames: int = LIMITS.max_frames  # longest motion
+    patch: int = 1  # frames a motion token
+    width: int = 256
+    depth: int = 9  # blocks a side, odd where skips are on
+    heads: int = 4
+    hidden: int = 1024  # feed-forward width
+    dropout: float = 0.1
+    scales: tuple[int, ...] = FULL_SCALES
+    codes: tuple[int, ...] = linear_codes(256, 768, 10)
+    code_width: int = 512
+    metric: str = "cosine"  # code look-up: cosine | euclidean
+    phi: str = "conv"  # conv | residual | identity
+    text_width: int = 2048  # width of the text encoder's token states
+    text_positions: int = LIMITS.max_text_positions  # positions reserved for text in front of the latents
+    text_side: TextSide = "both"  # Table 4e
+    text_mixing: Mixing = "in-context"  # tokenizer, Table 4g
+    motion_mixing: Mixing = "in-context"  # tokenizer, Table 4g
+    text_mixing_out: Mixing = "cross"  # detokenizer, Table 4g
+    latent_mixing_out: Mixing = "cross"  # detokenizer, Table 4g
+    norm: str = "rms"  # rms | layer, Table 4a-c
+    pre_norm: bool = False  # the released code is post-norm
+    feed: str = "swiglu"  # swiglu | gelu, Table 4a-c
+    skips: bool = True  # Table 4a-c
+    positions: Literal["rope", "learned"] = "rope"  # Table 4d
+    rope_base: float = 100.0  # Table 4d
+
+    @property
+    def latents(self) -> int:
+        """Number of latents T."""
+        return self.scales[-1]
+
+
+PRESETS: dict[str, TokenizerConfig] = {
+    "full": TokenizerConfig(),
+    "mid": TokenizerConfig(scales=MID_SCALES),
+    "mini": TokenizerConfig(scales=MINI_SCALES),
+    "tiny": TokenizerConfig(depth=3),
+    "lite": TokenizerConfig(
+        patch=4, width=192, depth=5, heads=3, hidden=512, dropout=0.0, scales=MID_SCALES,
+        codes=linear_codes(128, 384, 10), code_width=192, phi="residual", text_width=384, pre_norm=True,
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingOutput:
+    """What one training step of the tokenizer needs."""
+
+    features: Tensor  # [B, F, C] reconstruction, zero beyond each length
+    commitment: Tensor  # scalar
+    ids: tuple[Tensor, ...]  # [B, s_n] a level
+
+
+def length_mask(lengths: Tensor, size: int) -> Tensor | None:
+    """Boolean [B, size], True where real; None where every row is full."""
+    if bool((lengths >= size).all()):
+        return None
+    return torch.arange(size, device=lengths.device)[None] < lengths[:, None]
+
+
+class LGTok(nn.Module):
+    """Tokenizer and detokenizer of LG-Tok. Plain arguments come from a TokenizerConfig through `build_tokenizer`."""
+
+    def __init__(self, config: TokenizerConfig) -> None:
+        super().__init__()
+        c = self.config = config
+        shape = {"width": c.width, "heads": c.heads, "hidden": c.hidden, "depth": c.depth, "dropout": c.dropout}
+        options = {"norm": c.norm, "pre": c.pre_norm, "feed": c.feed, "skips": c.skips}
+        self.frames = -(-c.max_frames // c.patch)
+        self.text_in = c.text_side in ("both", "tokenizer")
+        self.text_out = c.text_side in ("both", "detokenizer")
+        crossed_in = (c.motion_mixing == "cross") + (self.text_in and c.text_mixing == "cross")
+        crossed_out = (c.latent_mixing_out == "cross") + (self.text_out and c.text_mixing_out == "cross")
+        self.motion_in = nn.Linear(c.patch * c.columns, c.width)
+        self.text_proj = nn.Linear(c.text_width, c.width)
+        self.latent_tokens = nn.Parameter(torch.randn(c.latents, c.width) * c.width**-0.5)
+        self.mask_vector = nn.Parameter(torch.randn(c.width) * c.width**-0.5)  # frame query and null text
+        self.query_positions = nn.Parameter(torch.randn(self.frames, c.width) * c.width**-0.5)
+        self.encoder = UStack(**shape, memories=crossed_in, **options)
+        self.decoder = UStack(**shape, memories=crossed_out, **options)
+        self.to_code = nn.Conv1d(c.width, c.code_width, 3, padding=1)
+        self.from_code = nn.Conv1d(c.code_width, c.width, 3, padding=1)
+        self.motion_out = nn.Linear(c.width, c.patch * c.columns)
+        self.quantizer = MultiScaleQuantizer(c.scales, c.codes, c.code_width, metric=c.metric, phi=c.phi)
+        if c.positions == "learned":
+            total = c.text_positions + c.latents + self.frames
+            self.table_in = nn.Parameter(torch.randn(total, c.width) * c.width**-0.5)
+        self.apply(_init)
+
+    # ---- positions and masks -------------------------------------------------------------------------------------
+
+    def _rotation(self, positions: Tensor) -> Rotation | None:
+        if self.config.positions != "rope":
+            return None
+        return rope_angles(positions, self.config.width // self.config.heads, self.config.rope_base)
+
+    def _patched(self, lengths: Tensor) -> Tensor:
+        return (lengths + self.config.patch - 1) // self.config.patch
+
+    def _text(self, text: TextFeatures, dropped: Tensor | None) -> Tensor:
+        """Projected text [B, W, D]; dropped rows (bool [B]) hold the mask vector in every position (A5)."""
+        states = self.text_proj(text.tokens)
+        if dropped is None:
+            return states
+        return torch.where(dropped[:, None, None], self.mask_vector.to(states.dtype), states)
+
+    # ---- tokenizer ------------------------------------------------------------------------------------------------
+
+    def latents(
+        self, features: Tensor, lengths: Tensor, text: TextFeatures | None, dropped: Tensor | None = None
+    ) -> Tensor:
+        """features [B, F, C] -> latents z [B, T, code width] before quantization. Dropped rows see no text."""
+        c = self.config
+        batch, frames = features.shape[:2]
+        short = -frames % c.patch
+        patches = F.pad(features, (0, 0, 0, short)).reshape(batch, -1, c.patch * c.columns)
+        motion = self.motion_in(patches)  # (B, F / patch, D)
+        motion_mask = length_mask(self._patched(lengths), motion.shape[1])
+        parts = [self.latent_tokens.to(motion.dtype).expand(batch, -1, -1)]
+        masks: list[Tensor | None] = [None]
+        starts = [c.text_positions]
+        memories = []
+        if c.motion_mixing == "in-context":
+            parts.append(motion)
+            masks.append(motion_mask)
+            starts.append(c.text_positions + c.latents)
+        else:
+            memories.append(Memory(motion, motion_mask))
+        if self.text_in and text is not None:
+            states, mask = self._text(text, dropped), text.mask
+            if c.text_mixing == "in-context":
+                parts.insert(0, states)
+                masks.insert(0, mask if dropped is None else mask & ~dropped[:, None])
+                starts.insert(0, 0)
+            else:
+                memories.append(Memory(states, mask))
+        elif self.text_in and c.text_mixing == "cross":
+            memories.append(Memory(self.mask_vector.to(motion.dtype).expand(batch, 1, -1)))
+        positions = torch.cat(
+            [torch.arange(p.shape[1], device=motion.device) + s for p, s in zip(parts, starts, strict=True)]
+        )
+        sequence = torch.cat(parts, dim=1)
+        if c.positions == "learned":
+            sequence = sequence + self.table_in[positions]
+        out = self.encoder(sequence, self._rotation(positions), _join_masks(masks, parts), memories)
+        first = parts[0].shape[1] if starts[0] == 0 else 0
+        kept = out[:, first : first + c.latents]
+        return self.to_code(kept.transpose(1, 2)).transpose(1, 2)  # (B, T, code width)
+
+    @torch.no_grad()
+    def encode(self, features: Tensor, lengths: Tensor, text: TextFeatures | None) -> Quantized:
+        """features [B, F, C] normalised, lengths int64 [B] -> Quantized. text None tokenizes without language."""
+        return self.quantizer.encode(self.latents(features, lengths, text))
+
+    @torch.no_grad()
+    def embed(self, tokens: Tokens, levels: int | None = None) -> Tensor:
+        """Tokens -> embedding [B, T, code width] of the coarsest `levels` scales."""
+        return self.quantizer.embed(tokens, levels)
+
+    # ---- detokenizer ----------------------------------------------------------------------------------------------
+
+    def _detokenize(self, embedding: Tensor, lengths: Tensor, text_memory: Memory | None) -> Tensor:
+        """embedding [B, T, code width] -> features [B, F, C], or [2B, F, C] where the memory asks for a null branch."""
+        c = self.config
+        batch, frames = len(lengths), int(lengths.max())
+        latents = self.from_code(embedding.transpose(1, 2)).transpose(1, 2)
+        tokens = self._patched(lengths)
+        count = int(tokens.max())
+        queries = (self.mask_vector + self.query_positions[:count]).to(latents.dtype).expand(batch, -1, -1)
+        parts, masks, memories = [queries], [length_mask(tokens, count)], []
+        if c.latent_mixing_out == "cross":
+            memories.append(Memory(latents))
+        else:
+            parts.insert(0, latents)
+            masks.insert(0, None)
+        if text_memory is not None and c.text_mixing_out == "cross":
+            memories.append(text_memory)
+        elif text_memory is not None:
+            parts.insert(0, text_memory.states)
+            masks.insert(0, text_memory.mask)
+        sequence = torch.cat(parts, dim=1)
+        positions = torch.arange(sequence.shape[1], device=sequence.device)
+        out = self.decoder(sequence, self._rotation(positions), _join_masks(masks, parts), memories)
+        motion = self.motion_out(out[:, -count:])  # (B or 2B, F / patch, patch * C)
+        motion = motion.reshape(len(out), count * c.patch, c.columns)[:, :frames]
+        real = length_mask(lengths, frames)
+        return motion if real is None else motion * real.repeat(len(out) // batch, 1)[..., None]
+
+    def _memory(self, batch: int, text: TextFeatures | None, dropped: Tensor | None) -> Memory | None:
+        if not self.text_out:
+            return None
+        if text is None:
+            return Memory(self.mask_vector.expand(batch, 1, -1))
+        return Memory(self._text(text, dropped), text.mask)
+
+    @torch.no_grad()
+    def branches(self, embedding: Tensor, lengths: Tensor, text: TextFeatures | None) -> tuple[Tensor, Tensor]:
+        """The decodes with text and with the null text, [B, F, C] each (A8); computed together."""
+        if text is None or not self.text_out:
+            plain = self.decode(embedding, lengths, text)
+            return plain, plain
+        if self.config.text_mixing_out == "in-context":
+            return self.decode(embedding, lengths, text), self.decode(embedding, lengths, None)
+        states = self._text(text, None)
+        memory = Memory(states, text.mask, None, self.mask_vector, len(lengths))
+        conditional, unconditional = self._detokenize(embedding, lengths, memory).chunk(2)
+        return conditional, unconditional
+
+    @torch.no_grad()
+    def decode(
+        self,
+        embedding: Tensor,
+        lengths: Tensor,
+        text: TextFeatures | None,
+        guidance: float = 0.0,
+        edit_mask: Tensor | None = None,
+    ) -> Tensor:
+        """embedding [B, T, code width] -> normalised features [B, F, C], F = longest length.
+
+        guidance g gives (1 + g) m_c - g m_u (A8). edit_mask: bool [B, F], text acts where True (Eq. 7); with patches, a
+        patch counts as edited if any of its frames is.
+        """
+        if guidance and edit_mask is None:
+            conditional, unconditional = self.branches(embedding, lengths, text)
+            return (1 + guidance) * conditional - guidance * unconditional
+        gate = None if edit_mask is None else self._gate(edit_mask, lengths)
+
+        def branch(words: TextFeatures | None) -> Tensor:
+            memory = self._memory(len(lengths), words, None)
+            if memory is not None and gate is not None:
+                memory = Memory(memory.states, memory.mask, gate)
+            return self._detokenize(embedding, lengths, memory)
+
+        conditional = branch(text)
+        return conditional if not guidance else (1 + guidance) * conditional - guidance * branch(None)
+
+    def _gate(self, edit_mask: Tensor, lengths: Tensor) -> Tensor:
+        short = int(self._patched(lengths).max()) * self.config.patch - edit_mask.shape[1]
+        padded = F.pad(edit_mask.bool(), (0, max(short, 0)))[:, : edit_mask.shape[1] + short]
+        patches = padded.reshape(len(edit_mask), -1, self.config.patch).any(dim=-1)
+        return patches[..., None].float()
+
+    # ---- training -------------------------------------------------------------------------------------------------
+
+    def forward(
+        self, features: Tensor, lengths: Tensor, text: TextFeatures | None, dropped: Tensor | None = None
+    ) -> TrainingOutput:
+        """One training pass: encode, quantize with straight-through gradients, decode. dropped: bool [B], no language."""
+        z = self.latents(features, lengths, text, dropped)
+        quantized = self.quantizer(z)
+        memory = self._memory(len(lengths), text, dropped)
+        out = self._detokenize(quantized.embedding.to(z.dtype), lengths, memory)
+        return TrainingOutput(out, quantized.commitment, quantized.ids)
+
+
+def _join_masks(masks: list[Tensor | None], parts: list[Tensor]) -> Tensor | None:
+    """Key masks of concatenated parts -> [B, S], or None where every part is full."""
+    if all(mask is None for mask in masks):
+        return None
+    filled = [
+        mask if mask is not None else torch.ones(part.shape[:2], dtype=torch.bool, device=part.device)
+        for mask, part in zip(masks, parts, strict=True)
+    ]
+    return torch.cat(filled, dim=1)
+
+
+def _init(module: nn.Module) -> None:
+    """Linear and convolution weights truncated normal std 0.02, biases 0 (A3)."""
+    if isinstance(module, nn.Linear | nn.Conv1d):
+        nn.init.trunc_normal_(module.weight, std=0.02)
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)
+
+
+def build_tokenizer(config: TokenizerConfig) -> LGTok:
+    """The module for a config, randomly initialised, in training mode."""
+    return LGTok(config)

@@ -1,0 +1,67 @@
+"""Every training run by name: what is trained, on how much, with which numbers. Rows of a table, not code."""
+
+from dataclasses import dataclass, field, replace
+
+from playground.data.batches import BatchConfig
+from playground.errors import PlaygroundError
+from playground.tokenizers.transformer import PRESETS, TokenizerConfig
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Optimiser and learning-rate plan: warm-up, constant, then a linear fall over the last part."""
+
+    steps: int = 20_000
+    rate: float = 4e-4
+    betas: tuple[float, float] = (0.9, 0.99)
+    weight_decay: float = 0.0
+    warmup: int = 300
+    fall: float = 0.3  # share of the steps over which the rate falls
+    floor: float = 0.05  # last rate as a share of `rate`
+    clip: float = 0.5  # gradient norm
+    save_every: int = 250
+    validate_every: int = 500
+
+
+@dataclass(frozen=True)
+class TokenizerTraining:
+    """One tokenizer run (systems.md A7)."""
+
+    model: TokenizerConfig
+    batch: BatchConfig = field(default_factory=BatchConfig)
+    schedule: Schedule = field(default_factory=Schedule)
+    text: str = "minilm"  # text encoder
+    synthetic: float = 0.1  # synthetic clips as a share of the training clips
+    language_drop: float = 0.1  # share of samples without text (A5)
+    commitment: float = 0.02
+    heading: float = 0.0  # weight of smoothL1 on the accumulated heading; not in the paper, 0 there
+    masked_mean: bool = False  # True: mean over real frames only; the released code counts padded frames as zeros
+    seed: int = 0
+
+
+TOKENIZERS: dict[str, TokenizerTraining] = {
+    "lgtok-lite-tokenizer": TokenizerTraining(
+        model=PRESETS["lite"],
+        batch=BatchConfig(size=32, speed=0.3, source_balance=0.5, action_balance=0.3),
+        schedule=Schedule(steps=7_000),
+        heading=0.5,
+        masked_mean=True,
+    ),
+}
+
+
+def with_steps(schedule: Schedule, steps: int | None) -> Schedule:
+    """The schedule with another number of steps, unchanged for None. PlaygroundError for less than one step."""
+    if steps is None:
+        return schedule
+    if steps < 1:
+        raise PlaygroundError(f"a run needs at least 1 step, got {steps}")
+    return replace(schedule, steps=steps)
+
+
+def rate_at(step: int, schedule: Schedule) -> float:
+    """Learning rate of a step (from 0)."""
+    warm = min(1.0, (step + 1) / max(schedule.warmup, 1))
+    first = schedule.steps * (1 - schedule.fall)
+    fallen = max(0.0, (step - first) / max(schedule.steps - first, 1))
+    return schedule.rate * warm * (1 - (1 - schedule.floor) * min(fallen, 1.0))

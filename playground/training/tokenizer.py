@@ -1,0 +1,139 @@
+"""Training an LG-Tok tokenizer: the loss of systems.md A7 and its validation figures."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from playground.checkpoints import Card, save_checkpoint
+from playground.data.batches import Batch, BatchSource, whole_batches
+from playground.evaluation.metrics import mpjpe
+from playground.motion.representation import Normaliser, from_features67
+from playground.text.encoders import TextEncoder, TextFeatures, identify
+from playground.text.store import FeatureStore
+from playground.tokenizers.transformer import LGTok, TrainingOutput
+from playground.training.configs import TokenizerTraining
+
+
+HEADING_SCALE = 0.4  # radians of yaw that move an outstretched hand by about one standard deviation of the positions
+
+
+def tokenizer_loss(
+    out: TrainingOutput, features: Tensor, lengths: Tensor, config: TokenizerTraining, heading_std: float
+) -> Tensor:
+    """smoothL1 on the features + weighted commitment (+ accumulated heading); scalar. heading_std: std of column 0.
+
+    With masked_mean the mean runs over real frames, else over all frames with padding as exact zeros (systems.md H16).
+    """
+    reconstruction = out.features.float()
+    real = torch.arange(features.shape[1], device=lengths.device)[None] < lengths[:, None]
+    error = F.smooth_l1_loss(reconstruction, features, reduction="none").mean(dim=-1)
+    loss = (error * real).sum() / real.sum() if config.masked_mean else error.mean()
+    if config.heading:
+        turned = ((reconstruction[..., 0] - features[..., 0]) * real).cumsum(dim=1) * (2 * heading_std / HEADING_SCALE)
+        drift = F.smooth_l1_loss(turned, torch.zeros_like(turned), reduction="none") * real
+        loss = loss + config.heading * drift.sum() / real.sum()
+    return loss + config.commitment * out.commitment
+
+
+class TokenizerInputs:
+    """One training batch on the device. Not a dataclass on purpose: Fabric would round its numbers to half precision."""
+
+    def __init__(self, features: Tensor, lengths: Tensor, text: TextFeatures, dropped: Tensor) -> None:
+        self.features = features  # float32 [B, F, 67]
+        self.lengths = lengths  # int64 [B]
+        self.text = text
+        self.dropped = dropped  # bool [B], no language
+
+
+class TokenizerStep(nn.Module):
+    """One training pass, loss included: what Fabric wraps, so that every process sees the whole of it."""
+
+    def __init__(self, model: LGTok, config: TokenizerTraining, heading_std: float) -> None:
+        super().__init__()
+        self.tokenizer = model
+        self.config = config
+        self.heading_std = heading_std
+
+    def forward(self, batch: TokenizerInputs) -> tuple[Tensor, Tensor, Tensor]:
+        """A batch -> loss, share of codes hit (mean over scales), commitment; scalars."""
+        out = self.tokenizer(batch.features, batch.lengths, batch.text, batch.dropped)
+        loss = tokenizer_loss(out, batch.features, batch.lengths, self.config, self.heading_std)
+        sizes = self.tokenizer.quantizer.codes
+        used = [len(ids.unique()) / codes for ids, codes in zip(out.ids, sizes, strict=True)]
+        return loss, loss.new_tensor(used).mean(), out.commitment.detach()
+
+
+class TokenizerTask:
+    """One tokenizer run on batches of motions with captions."""
+
+    def __init__(
+        self,
+        model: LGTok,
+        config: TokenizerTraining,
+        batches: BatchSource,
+        validation: list[Batch],
+        texts: FeatureStore,
+        encoder: TextEncoder,
+        data: str,
+        device: torch.device,
+    ) -> None:
+        self.tokenizer = model
+        self.model = TokenizerStep(model, config, float(batches.normaliser.std[0]))
+        self.config = config
+        self.batches = batches
+        self.validation = validation
+        self.texts = texts
+        self.encoder = encoder
+        self.data = data
+        self.device = device
+
+    def _tensors(self, batch: Batch) -> tuple[Tensor, Tensor, TextFeatures]:
+        text = self.texts.lookup(batch.captions).to(self.device)
+        return torch.from_numpy(batch.features).to(self.device), torch.from_numpy(batch.lengths).to(self.device), text
+
+    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, float]]:
+        """Loss of the batch of `step`; language drop is drawn from (seed, step) over the whole batch."""
+        batch = self.batches.batch(step, rank, world)
+        features, lengths, text = self._tensors(batch)
+        rng = np.random.default_rng([self.config.seed, 1, step])
+        drop = rng.random(self.config.batch.size) < self.config.language_drop
+        dropped = torch.from_numpy(drop[rank::world]).to(self.device)
+        loss, used, commitment = model(TokenizerInputs(features, lengths, text, dropped))
+        return loss, {"codes hit": float(used), "commitment": float(commitment)}
+
+    def validate(self) -> dict[str, float]:
+        """MPJPE in mm on the validation split, over clips and as a mean over sources, true captions, g = 0."""
+        errors: dict[str, list[float]] = {}
+        for batch in self.validation:
+            features, lengths, text = self._tensors(batch)
+            decoded = self.tokenizer.decode(self.tokenizer.encode(features, lengths, text).embedding, lengths, text)
+            for row, (length, source) in enumerate(zip(batch.lengths, batch.sources, strict=True)):
+                error = clip_error(features[row, :length], decoded[row, :length], self.batches.normaliser)
+                errors.setdefault(source, []).append(error)
+        means = {source: float(np.mean(values)) for source, values in errors.items()}
+        everything = [value for values in errors.values() for value in values]
+        figures = {"mpjpe_mm": float(np.mean(everything)), "mpjpe_mm_source_mean": float(np.mean(list(means.values())))}
+        return figures | {f"mpjpe_mm {source}": value for source, value in sorted(means.items())}
+
+    def export(self, path: Path, facts: dict[str, Any]) -> None:
+        """Write the shipped form of the tokenizer."""
+        card = Card(
+            kind="tokenizer",
+            config=self.tokenizer.config,
+            encoder=identify(self.encoder),
+            data=self.data,
+            facts=facts | {"seed": self.config.seed},
+            normaliser=self.batches.normaliser,
+        )
+        save_checkpoint(path, self.tokenizer, card)
+
+
+def clip_error(features: Tensor, decoded: Tensor, normaliser: Normaliser) -> float:
+    """MPJPE in mm of one clip: normalised rows [F, 67] against decoded ones."""
+    truth = from_features67(normaliser.invert(features.cpu().numpy()))
+    guess = from_features67(normaliser.invert(decoded.float().cpu().numpy()))
+    return mpjpe(truth, guess)
