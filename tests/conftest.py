@@ -19,6 +19,8 @@ settings.register_profile("repeatable", deadline=None, derandomize=True, suppres
 settings.register_profile("explore", deadline=None, max_examples=500, suppress_health_check=_SLOW_IS_FINE)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
+ACROSS = ("r_hip", "l_hip", "r_shoulder", "l_shoulder")
+
 
 @pytest.fixture(scope="session")
 def library_data() -> Path:
@@ -33,13 +35,15 @@ def library_data() -> Path:
 
 
 def rest_pose() -> NDArray[np.float64]:
-    """The T-pose [22, 3] of the reference skeleton, standing on the floor."""
+    """The T-pose [22, 3] of the reference skeleton, standing on the floor and facing exactly +Z."""
     joints = np.zeros((HUMAN22.size, 3))
     for joint, parent in enumerate(HUMAN22.parents):
         if parent >= 0:
             joints[joint] = joints[parent] + HUMAN22.offsets[joint]
-    joints[:, 1] -= joints[:, 1].min()
-    return joints
+    right_hip, left_hip, right_shoulder, left_shoulder = (joints[HUMAN22.index(name)] for name in ACROSS)
+    x, _, z = left_hip - right_hip + left_shoulder - right_shoulder
+    turned = joints @ (np.array([[x, 0.0, -z], [0.0, np.hypot(x, z), 0.0], [z, 0.0, x]]) / np.hypot(x, z))
+    return turned - [0.0, turned[:, 1].min(), 0.0]
 
 
 def drifting(frames: int = 48, seed: int = 0) -> NDArray[np.float32]:
