@@ -30,7 +30,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceEntry:
     """One row of the table of sources."""
 
     read: Callable[[Path | None], Reading]
