@@ -46,7 +46,7 @@ class StoredTokens:
     def __post_init__(self) -> None:
         if not self.ids or len(self.ids) != len(self.codes):
             raise PlaygroundError(
-                f"a token sequence needs a codebook size for every level, got {len(self.codes)} for {len(self.ids)} levels"
+                f"a token sequence needs a codebook size a level, got {len(self.codes)} for {len(self.ids)} levels"
             )
         for level, (ids, codes) in enumerate(zip(self.ids, self.codes, strict=True), start=1):
             bad = ids.ndim != 1 or not ids.size or not 1 <= codes <= 2**15
