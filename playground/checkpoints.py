@@ -103,7 +103,9 @@ def _read(path: Path, kind: str | None = None, weights: bool = False) -> tuple[C
     except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, PlaygroundError):
             raise
-        raise PlaygroundError(f"{path} is not a checkpoint of the playground (a .safetensors file with a card)") from error
+        raise PlaygroundError(
+            f"{path} is not a checkpoint of the playground (a .safetensors file with a card)"
+        ) from error
     if kind is not None and card.kind != kind:
         raise PlaygroundError(f"{path} is a {card.kind} checkpoint, a {kind} is needed here")
     return card, tensors

@@ -20,6 +20,7 @@ class Limits:
     max_seconds: float = 9.8  # longest generated motion (196 frames)
     max_seed: int = 2**31 - 1
     max_guidance: float = 6.0  # largest g of the detokenizer, and largest s of the generator
+    max_temperature: float = 2.0
     max_json_bytes: int = 2 * 1024 * 1024  # size of a token file
     max_figures: int = 6  # figures on one stage
     queue_size: int = 20  # visitors waiting for the model

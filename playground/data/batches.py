@@ -168,5 +168,3 @@ def whole_batches(samples: Sequence[Sample], normaliser: Normaliser, size: int, 
         length = min(len(sample.features), LIMITS.max_frames) // unit * unit
         cuts.append((sample.features[:length], next(iter(sample.captions), ""), sample.source))
     return [source._collate(cuts[i : i + size]) for i in range(0, len(cuts), size)]
-
-

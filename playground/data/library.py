@@ -1,9 +1,9 @@
 """The one on-disk motion library: a folder of flat binary arrays that are memory-mapped, plus two JSON files.
 
-    library.json     format, name, skeleton, fps, layout, number of clips
-    clips.jsonl      one object a clip: id, source, split, action, captions, start, stop (pose rows)
-    joints.f32       float32 [poses, J, 3], metres, canonical per clip, clips back to back
-    features.f32     float32 [rows, C], un-normalised; a clip of N poses has N-1 rows
+library.json     format, name, skeleton, fps, layout, number of clips
+clips.jsonl      one object a clip: id, source, split, action, captions, start, stop (pose rows)
+joints.f32       float32 [poses, J, 3], metres, canonical per clip, clips back to back
+features.f32     float32 [rows, C], un-normalised; a clip of N poses has N-1 rows
 """
 
 import json

@@ -15,6 +15,7 @@ from playground.generators.base import Step
 from playground.limits import LIMITS
 from playground.nn.attention import CrossAttention, KeyValueCache, SelfAttention
 from playground.nn.blocks import SwiGLU
+from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
 from playground.nn.rope import rope_angles
 from playground.nn.sampling import Sampling, draw, entropy_bits, guide
@@ -59,7 +60,7 @@ class Layer(nn.Module):
 
     def __init__(self, width: int, heads: int, hidden: int, dropout: float) -> None:
         super().__init__()
-        self.norms = nn.ModuleList(build_norm("rms", width) for _ in range(3))
+        self.norms = module_list(build_norm("rms", width) for _ in range(3))
         self.text_norm = build_norm("rms", width)
         self.cross = CrossAttention(width, heads, dropout=dropout)
         self.self_attention = SelfAttention(width, heads, dropout=dropout)
@@ -97,15 +98,19 @@ class ScalewiseTransformer(nn.Module):
         self.start = nn.Parameter(torch.empty(c.scales[0], c.width))
         self.level = nn.Parameter(torch.empty(len(c.scales), c.width))
         self.length = nn.Parameter(torch.empty(c.lengths, c.width))
-        self.layers = nn.ModuleList(Layer(c.width, c.heads, c.hidden, c.dropout) for _ in range(c.depth))
-        self.heads = nn.ModuleList(nn.Linear(c.width, v) for v in c.codes)
+        self.layers = module_list(Layer(c.width, c.heads, c.hidden, c.dropout) for _ in range(c.depth))
+        self.heads = module_list(nn.Linear(c.width, v) for v in c.codes)
         for table in (self.start, self.level, self.length):
             nn.init.trunc_normal_(table, std=(1 / (3 * c.width)) ** 0.5)
         self.apply(_init)
 
     def positions(self, level: int) -> Tensor:
         """Continuous positions [s_n] of a scale on the common axis 0..64; a single token stands at 0."""
-        return torch.linspace(0.0, ROPE_SPAN, self.config.scales[level]) if self.config.scales[level] > 1 else torch.zeros(1)
+        return (
+            torch.linspace(0.0, ROPE_SPAN, self.config.scales[level])
+            if self.config.scales[level] > 1
+            else torch.zeros(1)
+        )
 
     def pattern(self) -> Tensor:
         """Boolean [1, 1, S, S]: a token sees every token of its own and of coarser scales."""
@@ -185,7 +190,11 @@ class Edit:
             return source
         redraw = (~self.keep).float()[None, None]
         size = drawn.shape[1]
-        redraw = F.interpolate(redraw, size, mode="linear", align_corners=False)[0, 0] if len(self.keep) != size else redraw[0, 0]
+        redraw = (
+            F.interpolate(redraw, size, mode="linear", align_corners=False)[0, 0]
+            if len(self.keep) != size
+            else redraw[0, 0]
+        )
         return torch.where(redraw > 0.5, drawn, source)
 
 
@@ -219,7 +228,7 @@ class ScalewiseGenerator:
             logits = net.heads[level](net.run(x, memory, net.positions(level), None, cache))
             if guided:
                 ramp = sampling.cfg * level / max(len(quantizer.scales) - 1, 1)
-                logits = guide(*logits.chunk(2), ramp)
+                logits = guide(logits[: len(lengths)], logits[len(lengths) :], ramp)
             ids = draw(logits, sampling, rng)
             ids = ids if edit is None else edit.mix(level, ids)
             drawn.append(ids)

@@ -7,6 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from playground.nn.attention import CrossAttention, Memory, SelfAttention
+from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
 from playground.nn.rope import Rotation
 
@@ -59,9 +60,9 @@ class Block(nn.Module):
         self.pre = pre
         self.dropout = dropout
         self.self_attention = SelfAttention(width, heads, dropout=dropout)
-        self.cross_attentions = nn.ModuleList(CrossAttention(width, heads, dropout=dropout) for _ in range(memories))
+        self.cross_attentions = module_list(CrossAttention(width, heads, dropout=dropout) for _ in range(memories))
         self.feed_forward = build_feed_forward(feed, width, hidden, dropout)
-        self.norms = nn.ModuleList(build_norm(norm, width) for _ in range(memories + 2))
+        self.norms = module_list(build_norm(norm, width) for _ in range(memories + 2))
 
     def _drop(self, x: Tensor) -> Tensor:
         return F.dropout(x, self.dropout, self.training)
@@ -122,9 +123,11 @@ class UStack(nn.Module):
         if skips and depth % 2 == 0:
             raise ValueError(f"a stack with U-shaped skips needs an odd depth, got {depth}")
         self.half = depth // 2 if skips else 0
-        options = {"memories": memories, "dropout": dropout, "norm": norm, "pre": pre, "feed": feed}
-        self.blocks = nn.ModuleList(Block(width, heads, hidden, **options) for _ in range(depth))
-        self.merges = nn.ModuleList(nn.Linear(2 * width, width) for _ in range(self.half))
+        self.blocks = module_list(
+            Block(width, heads, hidden, memories=memories, dropout=dropout, norm=norm, pre=pre, feed=feed)
+            for _ in range(depth)
+        )
+        self.merges = module_list(nn.Linear(2 * width, width) for _ in range(self.half))
         self.entry = build_norm(norm, width)
         self.exit = build_norm(norm, width)
 

@@ -22,7 +22,7 @@ class Tokens:
         if len(self.ids) > len(self.codes):
             raise PlaygroundError(f"{len(self.ids)} token levels were given for {len(self.codes)} codebooks")
         for level, (ids, codes) in enumerate(zip(self.ids, self.codes, strict=False), start=1):
-            if ids.numel() and not (0 <= int(ids.min()) and int(ids.max()) < codes):
+            if ids.numel() and not (int(ids.min()) >= 0 and int(ids.max()) < codes):
                 raise PlaygroundError(f"token ids of level {level} must lie in 0..{codes - 1}")
 
     @property
@@ -42,7 +42,10 @@ class Tokens:
         return hash((self.codes, self.sizes))
 
     def __str__(self) -> str:
-        rows = [f"level {n} ({c} codes): {i.tolist()}" for n, (i, c) in enumerate(zip(self.ids, self.codes, strict=False), 1)]
+        rows = [
+            f"level {n} ({c} codes): {i.tolist()}"
+            for n, (i, c) in enumerate(zip(self.ids, self.codes, strict=False), 1)
+        ]
         return "\n".join(rows)
 
     def to_json(self) -> str:

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from playground.nn.modules import module_list
 from playground.tokenizers.base import Quantized, Tokens
 
 PHIS = ("conv", "residual", "identity")
@@ -107,7 +108,7 @@ class Phi(nn.Module):
             raise ValueError(f"unknown phi {kind!r}; accepted: {', '.join(PHIS)}")
         self.kind = kind
         count = {"conv": 2, "residual": 1, "identity": 0}[kind]
-        self.convs = nn.ModuleList(nn.Conv1d(width, width, 3, padding=1) for _ in range(count))
+        self.convs = module_list(nn.Conv1d(width, width, 3, padding=1) for _ in range(count))
 
     def forward(self, x: Tensor) -> Tensor:
         """x [B, T, D] -> [B, T, D]."""
@@ -140,8 +141,8 @@ class MultiScaleQuantizer(nn.Module):
         if len(scales) != len(codes):
             raise ValueError(f"{len(scales)} scales need as many codebook sizes, got {len(codes)}")
         self.scales = tuple(scales)
-        self.codebooks = nn.ModuleList(Codebook(v, width, metric=metric) for v in codes)
-        self.phis = nn.ModuleList(Phi(width, phi) for _ in scales)
+        self.codebooks = module_list(Codebook(v, width, metric=metric) for v in codes)
+        self.phis = module_list(Phi(width, phi) for _ in scales)
         self.started: Tensor
         self.register_buffer("started", torch.zeros((), dtype=torch.bool))
 

@@ -103,8 +103,6 @@ class LGTok(nn.Module):
     def __init__(self, config: TokenizerConfig) -> None:
         super().__init__()
         c = self.config = config
-        shape = {"width": c.width, "heads": c.heads, "hidden": c.hidden, "depth": c.depth, "dropout": c.dropout}
-        options = {"norm": c.norm, "pre": c.pre_norm, "feed": c.feed, "skips": c.skips}
         self.frames = -(-c.max_frames // c.patch)
         self.text_in = c.text_side in ("both", "tokenizer")
         self.text_out = c.text_side in ("both", "detokenizer")
@@ -115,8 +113,8 @@ class LGTok(nn.Module):
         self.latent_tokens = nn.Parameter(torch.randn(c.latents, c.width) * c.width**-0.5)
         self.mask_vector = nn.Parameter(torch.randn(c.width) * c.width**-0.5)  # frame query and null text
         self.query_positions = nn.Parameter(torch.randn(self.frames, c.width) * c.width**-0.5)
-        self.encoder = UStack(**shape, memories=crossed_in, **options)
-        self.decoder = UStack(**shape, memories=crossed_out, **options)
+        self.encoder = _build_stack(c, crossed_in)
+        self.decoder = _build_stack(c, crossed_out)
         self.to_code = nn.Conv1d(c.width, c.code_width, 3, padding=1)
         self.from_code = nn.Conv1d(c.code_width, c.width, 3, padding=1)
         self.motion_out = nn.Linear(c.width, c.patch * c.columns)
@@ -290,6 +288,21 @@ class LGTok(nn.Module):
         memory = self._memory(len(lengths), text, dropped)
         out = self._detokenize(quantized.embedding.to(z.dtype), lengths, memory)
         return TrainingOutput(out, quantized.commitment, quantized.ids)
+
+
+def _build_stack(c: TokenizerConfig, memories: int) -> UStack:
+    return UStack(
+        c.width,
+        c.heads,
+        c.hidden,
+        c.depth,
+        memories=memories,
+        dropout=c.dropout,
+        norm=c.norm,
+        pre=c.pre_norm,
+        feed=c.feed,
+        skips=c.skips,
+    )
 
 
 def _join_masks(masks: list[Tensor | None], parts: list[Tensor]) -> Tensor | None:

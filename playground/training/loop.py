@@ -21,7 +21,10 @@ from playground.training.state import load_state, save_state
 class Task(Protocol):
     """What is trained: a model, its loss on the batch of a step, its validation figures, its shipped form."""
 
-    model: nn.Module
+    @property
+    def model(self) -> nn.Module:
+        """The trained module; calling it runs one pass."""
+        ...
 
     def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, float]]:
         """Loss of this process's slice of the batch of `step`, and figures to show."""

@@ -9,14 +9,13 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from playground.checkpoints import Card, save_checkpoint
-from playground.data.batches import Batch, BatchSource, whole_batches
-from playground.evaluation.metrics import mpjpe
+from playground.data.batches import Batch, BatchSource
+from playground.motion.measures import mpjpe
 from playground.motion.representation import Normaliser, from_features67
 from playground.text.encoders import TextEncoder, TextFeatures, identify
 from playground.text.store import FeatureStore
 from playground.tokenizers.transformer import LGTok, TrainingOutput
 from playground.training.configs import TokenizerTraining
-
 
 HEADING_SCALE = 0.4  # radians of yaw that move an outstretched hand by about one standard deviation of the positions
 
@@ -40,7 +39,7 @@ def tokenizer_loss(
 
 
 class TokenizerInputs:
-    """One training batch on the device. Not a dataclass on purpose: Fabric would round its numbers to half precision."""
+    """One training batch on the device. Not a dataclass: Fabric would round its numbers to half precision."""
 
     def __init__(self, features: Tensor, lengths: Tensor, text: TextFeatures, dropped: Tensor) -> None:
         self.features = features  # float32 [B, F, 67]

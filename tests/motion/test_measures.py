@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from playground.errors import PlaygroundError
-from playground.evaluation.metrics import bone_drift, foot_sliding, joint_errors, mpjpe
+from playground.motion.measures import bone_drift, foot_sliding, joint_errors, mpjpe
 from playground.motion.skeleton import HUMAN22
 
 SEEDS = st.integers(0, 2**16)

@@ -1,0 +1,264 @@
+"""The only door of the app, the command line and the notebooks: load once, run, check the deadline. numpy in, numpy out.
+
+    engine = default_engine()
+    tokenized = engine.tokenize(motion, "a person walks", "lgtok-lite")
+    decoded = engine.reconstruct(tokenized, guidance=2.0)
+
+torch is imported at the first call that needs a model, so that importing this module is quick.
+"""
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from playground.data.examples import ExampleStore, StoredExample
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+from playground.motion.measures import mpjpe
+from playground.motion.motion import Motion
+from playground.motion.representation import canonicalise, from_features67, to_features67
+from playground.motion.skeleton import HUMAN22
+from playground.results import Decoded, Example, Generation, GenerationStep, GuidancePair, Tokenized
+from playground.systems import SYSTEMS, SystemInfo, checkpoint_path, describe, header, row_of
+from playground.text.prompts import normalise
+from playground.tokenizers.token_file import LevelTokens, TokenFile
+
+if TYPE_CHECKING:
+    from playground.runtime import Runtime
+
+ASSETS = Path(__file__).resolve().parent.parent / "assets"
+UNIT = 4  # frames: motions are floored to a multiple of it, as in the published evaluation (A2)
+
+
+class Engine:
+    """Loads each system once and answers from any thread; holds no state of a call."""
+
+    def __init__(self, assets: Path = ASSETS) -> None:
+        self.assets = assets
+        self._runtimes: dict[str, Runtime] = {}
+        self._lock = threading.Lock()
+
+    # ---- what there is -------------------------------------------------------------------------------------------
+
+    def systems(self) -> list[SystemInfo]:
+        """Every system of the table with what its checkpoint says; loads no weight."""
+        return [describe(self.assets, row) for row in SYSTEMS.values()]
+
+    def scales(self, system: str) -> list[tuple[int, int]]:
+        """(tokens, codes) of every scale, coarse to fine; loads no weight."""
+        path = checkpoint_path(self.assets, row_of(system).name, "tokenizer")
+        head = header(path)
+        if head is None:
+            raise PlaygroundError(f"the system {system} has no checkpoint here; train one with the train command")
+        config = json.loads(head["__metadata__"]["config"])
+        return list(zip(config["scales"], config["codes"], strict=True))
+
+    def codebooks(self, system: str) -> list[NDArray[np.float32]]:
+        """Code vectors [V, D] of every scale."""
+        return self.runtime(system).codebooks()
+
+    def examples(self) -> list[Example]:
+        """The example library; empty where none is shipped."""
+        folder = self.assets / "examples"
+        if not (folder / "index.json").is_file():
+            return []
+        stored = _open_examples(folder, (folder / "index.json").stat().st_mtime_ns)
+        return [self._example(entry) for entry in stored]
+
+    def runtime(self, system: str) -> "Runtime":
+        """The loaded models of a system. PlaygroundError if it is unknown or its checkpoint is absent or broken."""
+        row = row_of(system)
+        with self._lock:
+            if system not in self._runtimes:
+                from playground.runtime import load_runtime
+
+                self._runtimes[system] = load_runtime(self.assets, row)
+            return self._runtimes[system]
+
+    # ---- motion to tokens and back --------------------------------------------------------------------------------
+
+    def tokenize(self, motion: Motion, caption: str = "", system: str = "lgtok-lite") -> Tokenized:
+        """The tokens of a motion, guided by its caption ("" for no text).
+
+        Takes the first 196 rows; the rest is left out, choose another window with `Motion.slice`.
+        PlaygroundError for another skeleton or frame rate, or a motion that is too short.
+        """
+        began = time.perf_counter()
+        caption = normalise(caption, what="caption", allow_empty=True)
+        features, cut = prepare(motion)
+        levels, quantized = self.runtime(system).encode(features, caption)
+        return Tokenized(
+            system=system,
+            checkpoint=self.runtime(system).checkpoint,
+            caption=caption,
+            motion=replace(cut, caption=caption),
+            levels=levels,
+            residual_energy=quantized.energy,
+            embedding=quantized.embedding,
+            per_level=quantized.per_level,
+            seconds=time.perf_counter() - began,
+        )
+
+    def reconstruct(
+        self, tokenized: Tokenized, guidance: float = 0.0, scales: int | None = None, caption: str | None = None
+    ) -> Decoded:
+        """The motion that the tokens stand for, and its error against the tokenized one."""
+        decoded = self.decode(tokenized.token_file(), caption, guidance, scales)
+        return replace(decoded, mpjpe_mm=mpjpe(tokenized.motion.joints, decoded.motion.joints))
+
+    def decode(
+        self, tokens: TokenFile, caption: str | None = None, guidance: float = 0.0, scales: int | None = None
+    ) -> Decoded:
+        """Decode a token file. caption None: the one in the file. scales: keep the coarsest so many, all by default.
+
+        PlaygroundError if the tokens belong to another system's shape or the guidance is out of range.
+        """
+        began = time.perf_counter()
+        check_guidance(guidance)
+        runtime = self.runtime(tokens.system)
+        count = len(tokens.levels) if scales is None else scales
+        if not 1 <= count <= len(tokens.levels):
+            raise PlaygroundError(f"{scales} scales were asked for; 1 to {len(tokens.levels)} are accepted")
+        text = normalise(tokens.caption if caption is None else caption, what="caption", allow_empty=True)
+        features = runtime.decode(tokens.levels, tokens.frames, text, guidance, count)
+        motion = Motion(from_features67(runtime.normaliser.invert(features)), caption=text)
+        return Decoded(motion, features, None, guidance, count, time.perf_counter() - began)
+
+    def guidance_pair(self, result: Tokenized | Generation, caption: str | None = None) -> GuidancePair:
+        """Both branches of the detokenizer's guidance for a tokenized or generated motion."""
+        runtime = self.runtime(result.system)
+        text = normalise(result.caption if caption is None else caption, what="caption", allow_empty=True)
+        conditional, unconditional = runtime.branches(result.levels, result.motion.frames, text)
+        return GuidancePair(conditional, unconditional, runtime.normaliser.mean, runtime.normaliser.std)
+
+    # ---- text to motion -------------------------------------------------------------------------------------------
+
+    def generate_steps(
+        self,
+        prompt: str | None,
+        seconds: float,
+        system: str = "lgtok-lite",
+        seed: int = 0,
+        guidance: float = 2.0,
+        cfg: float = 4.0,
+        temperature: float = 1.0,
+        top_k: float = 0.2,
+        top_p: float = 0.95,
+        deadline: float | None = LIMITS.deadline_seconds,
+    ) -> Iterator[GenerationStep]:
+        """Yield the motion after every scale. prompt None is free-form. cfg guides the generator, guidance the decoder.
+
+        PlaygroundError for an empty prompt, a number out of range, or a run past the deadline (checked at every scale).
+        """
+        text = None if prompt is None else normalise(prompt)
+        frames = check_generation(seconds, seed, guidance, cfg, temperature, top_k, top_p)
+        runtime = self.runtime(system)
+        check = _deadline(deadline)
+        sampling = {"seed": seed, "cfg": cfg, "temperature": temperature, "top_k": top_k, "top_p": top_p}
+        entropy: list[NDArray[np.float32]] = []
+        for step in runtime.generate(text, frames, {**sampling, "check": check}):
+            entropy.append(step.entropy)
+            features = runtime.decode_embedding(step.embedding, frames, text or "", guidance)
+            joints = from_features67(runtime.normaliser.invert(features))
+            yield GenerationStep(step.level, step.levels, tuple(entropy), Motion(joints, caption=text or ""))
+
+    def generate(
+        self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, **options: Any
+    ) -> Generation:
+        """The finished motion; arguments as in `generate_steps`. The same seed gives the same tokens."""
+        began = time.perf_counter()
+        *_, last = self.generate_steps(prompt, seconds, system, seed, **options)
+        runtime = self.runtime(system)
+        text = last.motion.caption
+        guidance = options.get("guidance", 2.0)
+        features = runtime.decode(last.levels, last.motion.frames, text, guidance, len(last.levels))
+        took = time.perf_counter() - began
+        return Generation(
+            system, runtime.checkpoint, text, seed, last.levels, last.entropy, last.motion, features, took
+        )
+
+    # ---- inside ---------------------------------------------------------------------------------------------------
+
+    def _example(self, entry: StoredExample) -> Example:
+        source: Callable[[], Motion] = entry.motion if entry.joints is not None else partial(self._decoded, entry)
+        return Example(entry.id, entry.title, entry.caption, entry.action, entry.kind, entry.origin, source)
+
+    def _decoded(self, entry: StoredExample) -> Motion:
+        tokens = entry.tokens
+        if tokens is None:
+            raise PlaygroundError(f"the example {entry.id!r} holds neither joints nor tokens")
+        levels = tuple(LevelTokens(len(i), c, i) for i, c in zip(tokens.ids, tokens.codes, strict=True))
+        file = TokenFile(tokens.system, tokens.checkpoint, entry.caption, entry.frames, levels)
+        return replace(self.decode(file).motion, name=entry.title)
+
+
+def prepare(motion: Motion) -> tuple[NDArray[np.float32], Motion]:
+    """A motion as un-normalised rows [F, 67], F a multiple of 4 and at most 196, and the F canonical poses of them."""
+    if motion.skeleton != HUMAN22 or motion.fps != LIMITS.fps:
+        raise PlaygroundError(
+            f"a tokenizer takes {HUMAN22.size} joints at {LIMITS.fps} frames a second, got {motion.skeleton.size} joints"
+            f" at {motion.fps:g}; read the file with read_motion, which converts it"
+        )
+    rows = min(motion.frames - 1, LIMITS.max_frames) // UNIT * UNIT
+    if rows < LIMITS.min_frames:
+        need = (LIMITS.min_frames + 1) / LIMITS.fps
+        raise PlaygroundError(f"the motion has {motion.seconds:.2f} s; a tokenizer needs at least {need:.2f} s")
+    joints = canonicalise(motion.joints[: rows + 1])
+    return to_features67(joints), replace(motion, joints=joints[:rows])
+
+
+def check_guidance(guidance: float, name: str = "guidance") -> None:
+    """PlaygroundError unless 0 <= guidance <= the limit."""
+    if not 0 <= guidance <= LIMITS.max_guidance:
+        raise PlaygroundError(f"{name} is {guidance:g}; 0 to {LIMITS.max_guidance:g} is accepted")
+
+
+def check_generation(
+    seconds: float, seed: int, guidance: float, cfg: float, temperature: float, top_k: float, top_p: float
+) -> int:
+    """Frames of a generation of so many seconds: floor(20 s / 4) * 4. PlaygroundError for a number out of range."""
+    if not LIMITS.min_seconds <= seconds <= LIMITS.max_seconds:
+        raise PlaygroundError(
+            f"{seconds:g} seconds were asked for; {LIMITS.min_seconds:g} to {LIMITS.max_seconds:g} are accepted"
+        )
+    if not 0 <= seed <= LIMITS.max_seed:
+        raise PlaygroundError(f"the seed must be a whole number from 0 to {LIMITS.max_seed}")
+    check_guidance(guidance)
+    check_guidance(cfg, "cfg")
+    if not 0 <= temperature <= LIMITS.max_temperature:
+        raise PlaygroundError(f"temperature is {temperature:g}; 0 to {LIMITS.max_temperature:g} is accepted")
+    for name, share in (("top_k", top_k), ("top_p", top_p)):
+        if not 0 < share <= 1:
+            raise PlaygroundError(f"{name} is {share:g}; a share above 0 and at most 1 is accepted")
+    return int(LIMITS.fps * seconds + 1e-6) // UNIT * UNIT
+
+
+def _deadline(seconds: float | None) -> Callable[[], None] | None:
+    if seconds is None:
+        return None
+    end = time.monotonic() + seconds
+
+    def check() -> None:
+        if time.monotonic() > end:
+            raise PlaygroundError(f"the request took longer than {seconds:g} s and was stopped; try a shorter motion")
+
+    return check
+
+
+@lru_cache(maxsize=4)
+def _open_examples(folder: Path, changed: int) -> ExampleStore:
+    return ExampleStore.open(folder)
+
+
+@lru_cache(maxsize=1)
+def default_engine() -> Engine:
+    """The engine on the repository's own assets, one a process."""
+    return Engine()

@@ -1,0 +1,104 @@
+"""What the engine gives back: plain dataclasses with numpy arrays, for one motion each. No torch."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from playground.motion.motion import Motion
+from playground.tokenizers.token_file import LevelTokens, TokenFile
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Tokenized:
+    """A motion as tokens."""
+
+    system: str
+    checkpoint: str  # first 12 digits of the sha256 of the tokenizer's file
+    caption: str
+    motion: Motion  # what was tokenized: canonical, F poses, F a multiple of 4
+    levels: tuple[LevelTokens, ...]
+    residual_energy: Floats  # [N + 1], share of the mean square of z left after 0..N scales
+    embedding: Floats  # [T, D], sum of all scales
+    per_level: Floats  # [N, T, D], each scale's share
+    seconds: float = 0.0
+
+    def token_file(self) -> TokenFile:
+        """The same tokens as a file that can be saved and decoded."""
+        return TokenFile(self.system, self.checkpoint, self.caption, self.motion.frames, self.levels)
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """Tokens as a motion again."""
+
+    motion: Motion  # F poses
+    features: Floats  # [F, 67], normalised
+    mpjpe_mm: float | None  # pelvis-relative against the tokenized motion, where there is one
+    guidance: float
+    scales: int
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class GenerationStep:
+    """A motion on its way: what is known after some scales."""
+
+    level: int  # scales drawn, from 1
+    levels: tuple[LevelTokens, ...]
+    entropy: tuple[Floats, ...]  # [s_n] bits a scale, of the distributions drawn from
+    motion: Motion  # decoded from the scales so far
+
+
+@dataclass(frozen=True, eq=False)
+class Generation:
+    """A finished generation."""
+
+    system: str
+    checkpoint: str
+    prompt: str  # "" for free-form
+    seed: int
+    levels: tuple[LevelTokens, ...]
+    entropy: tuple[Floats, ...]
+    motion: Motion
+    features: Floats = field(repr=False)  # [F, 67], normalised
+    seconds: float = 0.0
+
+    @property
+    def caption(self) -> str:
+        """The text a decoder is guided by: the prompt."""
+        return self.prompt
+
+    def token_file(self) -> TokenFile:
+        """The tokens as a file that can be saved and decoded."""
+        return TokenFile(self.system, self.checkpoint, self.prompt, self.motion.frames, self.levels)
+
+
+@dataclass(frozen=True, eq=False)
+class GuidancePair:
+    """Both branches of language-free guidance: m = (1 + g) conditional - g unconditional, normalised (A8)."""
+
+    conditional: Floats  # [F, 67]
+    unconditional: Floats  # [F, 67]
+    mean: Floats  # [67]
+    std: Floats  # [67]
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """One entry of the example library."""
+
+    id: str
+    title: str
+    caption: str
+    action: str
+    kind: str  # synthetic | generated | decoded clip
+    origin: str  # one sentence
+    source: Callable[[], Motion] = field(repr=False)
+
+    def motion(self) -> Motion:
+        """The motion itself; a decoded clip is decoded on the fly."""
+        return self.source()

@@ -1,0 +1,140 @@
+"""The loaded models of one system behind numpy arrays: what the engine calls. The one place where torch meets numpy."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from playground.checkpoints import load_generator, load_tokenizer
+from playground.errors import PlaygroundError
+from playground.generators.scalewise import ScalewiseGenerator
+from playground.motion.representation import Normaliser
+from playground.nn.sampling import Sampling
+from playground.systems import SystemRow, checkpoint_path
+from playground.text.encoders import CachedEncoder, TextFeatures, check_same, load_encoder
+from playground.tokenizers.base import Tokens
+from playground.tokenizers.token_file import LevelTokens
+from playground.tokenizers.transformer import LGTok
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class QuantizedArrays:
+    """The numbers of one quantized motion."""
+
+    energy: Floats  # [N + 1]
+    embedding: Floats  # [T, D]
+    per_level: Floats  # [N, T, D]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnScale:
+    """One step of a generation."""
+
+    level: int
+    levels: tuple[LevelTokens, ...]
+    entropy: Floats  # [s_level], bits
+    embedding: Tensor  # [1, T, D]
+
+
+@dataclass(frozen=True, eq=False)
+class Runtime:
+    """Tokenizer, generator and text encoder of one system; stateless, safe to share between threads."""
+
+    name: str
+    tokenizer: LGTok
+    generator: ScalewiseGenerator | None
+    encoder: CachedEncoder
+    normaliser: Normaliser
+    checkpoint: str
+    data: str
+
+    def text(self, caption: str) -> TextFeatures | None:
+        """Features of a caption; None for the empty one: no text at all."""
+        return self.encoder.encode([caption]) if caption else None
+
+    def codebooks(self) -> list[Floats]:
+        """Code vectors [V, D] of every scale."""
+        return [book.vectors.numpy().copy() for book in self.tokenizer.quantizer.codebooks]  # type: ignore[operator]
+
+    def encode(self, features: Floats, caption: str) -> tuple[tuple[LevelTokens, ...], QuantizedArrays]:
+        """Un-normalised rows [F, 67] -> tokens, and the numbers behind them."""
+        x = torch.from_numpy(self.normaliser.apply(features))[None]
+        quantized = self.tokenizer.encode(x, torch.tensor([len(features)]), self.text(caption))
+        norm = quantized.residual_norm[:, 0]
+        numbers = QuantizedArrays(
+            (norm / norm[0].clamp(min=1e-12)).numpy(), quantized.embedding[0].numpy(), quantized.per_level[:, 0].numpy()
+        )
+        return level_tokens(quantized.tokens), numbers
+
+    def embedding(self, levels: Sequence[LevelTokens], count: int | None = None) -> Tensor:
+        """Embedding [1, T, D] of the coarsest `count` scales. PlaygroundError if the tokens do not fit this system."""
+        quantizer = self.tokenizer.quantizer
+        expected = list(zip(quantizer.scales, quantizer.codes, strict=True))
+        given = [(level.size, level.codes) for level in levels]
+        if given != expected:
+            raise PlaygroundError(
+                f"these tokens do not fit {self.name}, which has {len(expected)} levels of"
+                f" {', '.join(str(size) for size, _ in expected)} tokens"
+            )
+        tokens = Tokens(tuple(torch.from_numpy(level.ids.copy())[None] for level in levels), quantizer.codes)
+        return self.tokenizer.embed(tokens, count)
+
+    def decode(self, levels: Sequence[LevelTokens], frames: int, caption: str, guidance: float, count: int) -> Floats:
+        """Tokens of one motion -> normalised rows [frames, 67]."""
+        return self.decode_embedding(self.embedding(levels, count), frames, caption, guidance)
+
+    def decode_embedding(self, embedding: Tensor, frames: int, caption: str, guidance: float) -> Floats:
+        """Embedding [1, T, D] -> normalised rows [frames, 67]."""
+        return self.tokenizer.decode(embedding, torch.tensor([frames]), self.text(caption), guidance)[0].numpy()
+
+    def branches(self, levels: Sequence[LevelTokens], frames: int, caption: str) -> tuple[Floats, Floats]:
+        """Normalised rows [frames, 67] decoded with the caption and with the null text."""
+        pair = self.tokenizer.branches(self.embedding(levels), torch.tensor([frames]), self.text(caption))
+        return pair[0][0].numpy(), pair[1][0].numpy()
+
+    def generate(self, prompt: str | None, frames: int, sampling: dict[str, Any]) -> Iterator[DrawnScale]:
+        """Draw one motion scale by scale. PlaygroundError if the system has no generator."""
+        if self.generator is None:
+            raise PlaygroundError(f"the system {self.name} has no generator; it can tokenize and decode only")
+        text = None if prompt is None else self.text(prompt)
+        for step in self.generator.steps(text, torch.tensor([frames]), Sampling(**sampling)):
+            yield DrawnScale(step.level, level_tokens(step.tokens), step.entropy[0].numpy(), step.embedding)
+
+
+def level_tokens(tokens: Tokens) -> tuple[LevelTokens, ...]:
+    """The tokens of a batch of one as arrays."""
+    return tuple(
+        LevelTokens(ids.shape[1], codes, ids[0].numpy().astype(np.int64))
+        for ids, codes in zip(tokens.ids, tokens.codes, strict=False)
+    )
+
+
+def load_runtime(assets: Path, row: SystemRow) -> Runtime:
+    """Load a system's files. PlaygroundError if they are absent, broken, or made for another text encoder."""
+    torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS") or os.cpu_count() or 1))
+    path = checkpoint_path(assets, row.name, "tokenizer")
+    if not path.is_file():
+        raise PlaygroundError(f"the system {row.name} has no checkpoint here; train one with the train command")
+    tokenizer, card = load_tokenizer(path)
+    if card.normaliser is None:
+        raise PlaygroundError(f"{path} carries no normaliser; it is not a finished tokenizer checkpoint")
+    encoder = load_encoder(row.text)
+    check_same(card.encoder, encoder)
+    generator = None
+    generator_path = checkpoint_path(assets, row.name, "generator")
+    if row.generator is not None and generator_path.is_file():
+        network, generator_card = load_generator(generator_path)
+        check_same(generator_card.encoder, encoder)
+        drawn_from = generator_card.facts.get("tokenizer")
+        if drawn_from is not None and drawn_from != card.hash[:12]:
+            raise PlaygroundError(f"{generator_path} was trained on the tokens of another tokenizer; train it again")
+        generator = ScalewiseGenerator(network, tokenizer.quantizer)
+    return Runtime(row.name, tokenizer, generator, CachedEncoder(encoder), card.normaliser, card.hash[:12], card.data)

@@ -1,0 +1,106 @@
+"""The table of systems: name -> tokenizer, generator, text encoder, checkpoint files. A system is a row. No torch.
+
+`SystemInfo` is what the rooms and the command line list; it is read from the headers of the checkpoint files alone.
+"""
+
+import json
+import struct
+from dataclasses import dataclass
+from functools import lru_cache
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from playground.errors import PlaygroundError
+
+MAX_HEADER = 8 * 1024 * 1024  # bytes of a checkpoint's header
+
+
+@dataclass(frozen=True)
+class SystemRow:
+    """One system. Files stand in `assets/checkpoints/<name>/`, unless another system lends its tokenizer."""
+
+    name: str
+    title: str  # what the screen calls it
+    family: str  # colour family of figures/colors.py
+    tokenizer: str | None  # what kind, in the words of its paper
+    generator: str | None
+    text: str = "minilm"  # text encoder of both
+    latents_are_frames: bool = False  # does a latent stand for a fixed span of frames by construction?
+
+
+SYSTEMS: dict[str, SystemRow] = {
+    row.name: row
+    for row in (SystemRow("lgtok-lite", "LG-Tok lite", "lgtok", "LG-Tok transformer", "scale-wise autoregression"),)
+}
+
+
+@dataclass(frozen=True)
+class SystemInfo:
+    """A row with what its checkpoints say."""
+
+    name: str
+    title: str
+    family: str
+    tokenizer: str | None
+    generator: str | None
+    text: str
+    parameters: int  # trainable numbers and codebooks of the files that are there
+    data: str  # library it was trained on, "" if absent
+    checkpoint: str  # shipped | absent
+    facts: dict[str, Any]  # of the tokenizer: steps, seconds, seed, last validation
+
+
+def checkpoint_path(assets: Path, name: str, part: str) -> Path:
+    """The file of a system's `tokenizer` or `generator`."""
+    return assets / "checkpoints" / name / f"{part}.safetensors"
+
+
+def row_of(name: str) -> SystemRow:
+    """A row of the table. PlaygroundError for an unknown name."""
+    if name not in SYSTEMS:
+        raise PlaygroundError(f"unknown system {str(name)[:80]!r}; one of {', '.join(SYSTEMS)} is accepted")
+    return SYSTEMS[name]
+
+
+@lru_cache(maxsize=64)
+def _header(path: Path, changed: int) -> dict[str, Any]:
+    """The JSON header of a safetensors file: 8 bytes of length, then the text. `changed` keys the cache."""
+    try:
+        with open(path, "rb") as file:
+            (size,) = struct.unpack("<Q", file.read(8))
+            if size > MAX_HEADER:
+                raise ValueError("header")
+            return dict(json.loads(file.read(size)))
+    except (OSError, ValueError, struct.error) as error:
+        raise PlaygroundError(
+            f"{path} is not a checkpoint of the playground (a .safetensors file with a card)"
+        ) from error
+
+
+def header(path: Path) -> dict[str, Any] | None:
+    """Header of a checkpoint, or None where there is no file. PlaygroundError if it is broken."""
+    return _header(path, path.stat().st_mtime_ns) if path.is_file() else None
+
+
+def describe(assets: Path, row: SystemRow) -> SystemInfo:
+    """What a system's checkpoint files say, without loading a weight."""
+    heads = {part: header(checkpoint_path(assets, row.name, part)) for part in ("tokenizer", "generator")}
+    numbers = 0
+    for head in heads.values():
+        shapes = [v["shape"] for k, v in (head or {}).items() if k.startswith("model.")]
+        numbers += sum(prod(shape) for shape in shapes)
+    metadata = next((head["__metadata__"] for head in heads.values() if head is not None), None)
+    has_generator = row.generator is not None and heads["generator"] is not None
+    return SystemInfo(
+        name=row.name,
+        title=row.title,
+        family=row.family,
+        tokenizer=row.tokenizer,
+        generator=row.generator if has_generator or metadata is None else None,
+        text=row.text,
+        parameters=numbers,
+        data=metadata["data"] if metadata else "",
+        checkpoint="shipped" if metadata else "absent",
+        facts=json.loads(metadata["facts"]) if metadata else {},
+    )
