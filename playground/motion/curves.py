@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 def ease(u: ArrayLike) -> Array:
@@ -40,7 +40,7 @@ def window(t: Array, start: float, stop: float, fade: float) -> Array:
 
 
 def wobble(t: Array, rng: np.random.Generator, size: float, columns: int = 1, slowest: float = 6.0) -> Array:
-    """Slow natural variation [F, columns] of about `size`: three sines with periods slowest/1..slowest/4 and free phases."""
+    """Slow natural variation [F, columns] of about `size`: three sines, periods slowest/4..slowest, free phases."""
     period = slowest / rng.uniform(1.0, 4.0, (3, columns))
     phase = rng.uniform(0.0, 2.0 * np.pi, (3, columns))
     weight = rng.uniform(0.3, 1.0, (3, columns))

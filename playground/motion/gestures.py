@@ -1,9 +1,11 @@
-"""Gestures and whole-body actions that are laid over a standing or travelling pose: hands, punches, squats, bows, sitting,
-kicks, jumps. numpy only.
+"""Gestures and whole-body actions that are laid over a standing or travelling pose. numpy only.
 
-Every function changes a `Pose` in place between `start` and `stop` (seconds; t [F] is the time of every frame). Arm targets
-are (outwards, forwards, twist, elbow) in radians, see rig.py; they were read off recorded clips.
+Hands, punches, squats, bows, sitting, kicks, jumps. Every function changes a `Pose` in place between `start` and `stop`
+(seconds; t [F] is the time of every frame). Arm targets are (outwards, forwards, twist, elbow) in radians, see rig.py;
+they were read off recorded clips.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from playground.motion.curves import ease, hermite, keyed, window
 from playground.motion.rig import FLAT, SIGN, Pose
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 GRAVITY = 9.81
 RAISED = {  # where a raised hand may end up
@@ -43,7 +45,7 @@ def _arm(pose: Pose, side: int, share: Array, target: ArrayLike) -> None:
 
 
 def raise_hand(pose: Pose, t: Array, start: float, stop: float, side: int, place: str, move: float = 0.6) -> None:
-    """Lift one hand to a place of RAISED in `move` seconds, hold it, lower it; stays up if stop is beyond the last frame."""
+    """Lift one hand to a place of RAISED in `move` seconds, hold it, lower it; up to the end if stop is beyond it."""
     share = window(t, start, stop, move)
     _arm(pose, side, share, RAISED[place])
     pose.spine[:, 2] += SIGN[side] * 0.05 * share
@@ -51,8 +53,9 @@ def raise_hand(pose: Pose, t: Array, start: float, stop: float, side: int, place
 
 
 def wave_hand(
-    pose: Pose, t: Array, start: float, stop: float, side: int, place: str, times: int, size: float = 1.0, move: float = 0.5
-) -> None:
+    pose: Pose, t: Array, start: float, stop: float, side: int, place: str, times: int, size: float = 1.0,
+    move: float = 0.5,
+) -> None:  # fmt: skip
     """Lift one hand and wave it `times` times to and fro."""
     base, swing = (np.asarray(x) for x in WAVES[place])
     share = window(t, start, stop, move)
@@ -136,9 +139,11 @@ def kick(pose: Pose, t: Array, start: float, stop: float, side: int, times: int,
     for number in range(times):
         at = lambda share, begin=start + number * beat: begin + share * beat  # noqa: E731
         path = [(at(0.0), (0, 0, 0)), (at(0.3), (-0.24, 0, 0.22)), (at(0.42), (0.12, 0, 0.30)),
-                (at(0.56), (0.30 + 0.32 * min(height, 1.0), 0, height)), (at(0.74), (0.22, 0, 0.28)), (at(0.98), (0, 0, 0))]
+                (at(0.56), (0.30 + 0.32 * min(height, 1.0), 0, height)), (at(0.74), (0.22, 0, 0.28)),
+                (at(0.98), (0, 0, 0))]  # fmt: skip
         ankle += _through(t, path)
-        foot += keyed(t, [(at(0.0), 0.0), (at(0.25), -0.8), (at(0.56), -0.35 + 0.5 * height), (at(0.75), -0.3), (at(0.95), 0.0)])
+        up = -0.35 + 0.5 * height
+        foot += keyed(t, [(at(0.0), 0.0), (at(0.25), -0.8), (at(0.56), up), (at(0.75), -0.3), (at(0.95), 0.0)])
         swing += keyed(t, [(at(0.0), 0.0), (at(0.28), -0.35), (at(0.56), 1.0), (at(0.97), 0.0)])
     forward, left = forward_left(pose.pelvis[:, 0])
     pose.ankle[:, side] += ankle[:, :1] * forward + ankle[:, 2:] * np.array([0.0, 1.0, 0.0])
@@ -155,7 +160,7 @@ def kick(pose: Pose, t: Array, start: float, stop: float, side: int, times: int,
     pose.arm[:, :, 3] += 0.35 * weight[:, None]
 
 
-def _through(t: Array, keys: list[tuple[float, tuple[float, float, float]]]) -> Array:
+def _through(t: Array, keys: Sequence[tuple[float, tuple[float, float, float]]]) -> Array:
     """Smooth curve [F, 3] through keys without stopping at them (cubic Hermite, slopes from the neighbours)."""
     times = np.array([k[0] for k in keys])
     values = np.array([k[1] for k in keys], np.float64)
@@ -184,14 +189,15 @@ def _crouch(height: float) -> float:
 
 
 def jump(pose: Pose, t: Array, start: float, height: float, distance: float) -> None:
-    """One jump: the pelvis rises `height` metres above the stretched stance and lands `distance` metres farther forwards."""
+    """One jump: the pelvis rises `height` metres above the stretched stance, lands `distance` metres farther on."""
     crouch, leave, speed = _crouch(height), 0.05, float(np.sqrt(2.0 * GRAVITY * height))
     off = start + 0.45 + _push(height)
     air = 2.0 * speed / GRAVITY
     land, soft = off + air, 0.22
     rise = -crouch * ease((t - start) / 0.45)
     push = (t >= start + 0.45) & (t < off)
-    rise[push] = hermite((t[push] - start - 0.45) / (off - start - 0.45), -crouch, leave, 0.0, speed * (off - start - 0.45))
+    span = _push(height)
+    rise[push] = hermite((t[push] - off) / span + 1.0, -crouch, leave, 0.0, speed * span)
     fly = (t >= off) & (t < land)
     rise[fly] = leave + speed * (t[fly] - off) - 0.5 * GRAVITY * (t[fly] - off) ** 2
     down = t >= land
@@ -200,7 +206,7 @@ def jump(pose: Pose, t: Array, start: float, height: float, distance: float) -> 
     forward, _ = forward_left(pose.pelvis[:, 0])
     bent = np.clip(-rise / crouch, 0.0, 1.0)
     travelled = distance * np.clip((t - off) / air, 0.0, 1.0)
-    early = 0.12 * min(distance, 1.0) * window(t, start + 0.2, land, 0.3)
+    early = 0.12 * min(distance, 1.0) * window(t, start + 0.2, land, 0.3)  # the body leads the feet
     pose.root += travelled[:, None] * forward + (early - 0.1 * bent)[:, None] * forward
     pose.root[:, 1] += rise
     pose.pelvis[:, 1] += 0.35 * bent
@@ -214,6 +220,7 @@ def jump(pose: Pose, t: Array, start: float, height: float, distance: float) -> 
         pose.ankle[:, side] += travelled[:, None] * forward
         pose.ankle[:, side, 1] = np.maximum(FLAT[side] + lifted + tuck + heel, pose.ankle[:, side, 1])
         pose.foot[:, side, 1] += point
-        back = keyed(t, [(start, 0.0), (start + 0.4, -0.8), (off + 0.1, 1.9), (land + 0.1, 0.7), (land + 0.7, 0.0)])
+        swing = [(start, 0.0), (start + 0.4, -0.6), (off + 0.6 * air, 1.3), (land + 0.2, 0.5), (land + 0.8, 0.0)]
+        back = keyed(t, swing)
         pose.arm[:, side, 1] += back
         pose.arm[:, side, 3] += 0.35 * np.abs(back)

@@ -1,7 +1,8 @@
-"""Body angles and ankle targets -> joints on HUMAN22's exact bone lengths: forward kinematics and two-bone leg IK. numpy only.
+"""Body angles and ankle targets -> joints on HUMAN22's exact bone lengths: forward kinematics, leg IK. numpy only.
 
-Side 0 is left, side 1 right, angles in radians. Arms are given as a swing (outwards, forwards) from hanging straight down,
-a twist about the upper arm (outwards positive) and the bend of the elbow; legs by where the ankle is and how the foot lies.
+Side 0 is left, side 1 right, angles in radians. Arms are given as a swing (outwards, forwards) from hanging straight
+down, a twist about the upper arm (outwards positive) and the bend of the elbow; legs by where the ankle is and how the
+foot lies.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from playground.motion.curves import dilate, smooth
 from playground.motion.rotation import qmul, qrotate, yaw_quaternion
 from playground.motion.skeleton import HUMAN22
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 OFFSETS = np.asarray(HUMAN22.offsets, np.float64)
 LENGTHS = np.linalg.norm(OFFSETS, axis=-1)
@@ -21,7 +22,7 @@ SIGN = np.array([1.0, -1.0])  # left, right: sign of the outward direction on X
 HIP, KNEE, ANKLE, FOOT = (1, 2), (4, 5), (7, 8), (10, 11)
 COLLAR, SHOULDER, ELBOW, WRIST = (13, 14), (16, 17), (18, 19), (20, 21)
 FLAT = -OFFSETS[list(FOOT), 1]  # height of the ankle [2] when the foot lies flat on the floor
-REACH = 0.994 * (LENGTHS[list(KNEE)] + LENGTHS[list(ANKLE)])  # longest hip to ankle distance [2] a pose may ask for
+REACH = 0.997 * (LENGTHS[list(KNEE)] + LENGTHS[list(ANKLE)])  # longest hip to ankle distance [2] a pose may ask for
 HIP_DROP = -OFFSETS[list(HIP), 1].mean()
 ARM_AT_REST = np.array([0.22, 0.03, -0.25, 0.36])  # outwards, forwards, twist, elbow of a hanging arm
 
@@ -43,7 +44,8 @@ class Pose:
     @classmethod
     def standing(cls, frames: int) -> "Pose":
         """A person at the origin facing +Z, arms hanging, feet flat."""
-        pose = cls(*(np.zeros((frames, *shape)) for shape in ((3,), (3,), (3,), (3,), (2, 4), (2,), (2, 3), (2, 2), (2,))))
+        shapes: tuple[tuple[int, ...], ...] = ((3,), (3,), (3,), (3,), (2, 4), (2,), (2, 3), (2, 2), (2,))
+        pose = cls(*(np.zeros((frames, *shape)) for shape in shapes))
         pose.arm[:] = ARM_AT_REST
         pose.ankle[:, :, 0], pose.ankle[:, :, 1] = 0.09 * SIGN, FLAT
         pose.splay[:] = 0.12
@@ -101,7 +103,7 @@ def _legs(joints: Array, pose: Pose) -> None:
         hip = joints[:, HIP[side]]
         line = pose.ankle[:, side] - hip
         distance = np.maximum(np.linalg.norm(line, axis=-1, keepdims=True), 1e-9)
-        line, distance = line / distance, np.clip(distance, 0.3, REACH[side] / 0.994 * 0.9999)
+        line, distance = line / distance, np.clip(distance, 0.3, REACH[side] / 0.997 * 0.9999)
         foot_yaw = pose.foot[:, side, 0] - pose.pelvis[:, 0]
         foot_yaw = (foot_yaw + np.pi) % (2 * np.pi) - np.pi
         yaw = pose.pelvis[:, 0] + 0.5 * foot_yaw + SIGN[side] * pose.splay[:, side]
@@ -137,10 +139,11 @@ def joints_of(pose: Pose) -> Array:
 def lower_to_reach(pose: Pose) -> None:
     """Lower the pelvis, smoothly and only where needed, until both ankles can be reached."""
     hips = turn(pose.pelvis)
-    drop = np.zeros(len(pose.root))
+    drop = np.full(len(pose.root), -1.0)
     for side in (0, 1):
         gap = pose.root + qrotate(hips, OFFSETS[HIP[side]]) - pose.ankle[:, side]
         allowed = np.sqrt(np.maximum(REACH[side] ** 2 - gap[:, 0] ** 2 - gap[:, 2] ** 2, 0.09))
         drop = np.maximum(drop, gap[:, 1] - allowed)
-    if (drop > 0).any():
-        pose.root[:, 1] -= smooth(dilate(drop, 2), 1.0)
+    soft = 0.006  # metres; the leg stretches softly towards its limit, so that the knee does not snap
+    drop = soft * np.logaddexp(0.0, np.maximum(drop + soft, -1.0) / soft)
+    pose.root[:, 1] -= smooth(dilate(drop, 1), 1.0)
