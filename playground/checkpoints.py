@@ -1,7 +1,7 @@
 """Self-describing checkpoints: one safetensors file holds half-precision weights, and its metadata says the rest.
 
-Metadata: format, kind (tokenizer | generator), config, encoder (name, width, hash of the text encoder), data, facts (steps,
-seconds, seed, validation figures). Loading needs no other file and runs no pickle.
+Metadata: format, kind (tokenizer | generator), config, encoder (name, width, hash of the text encoder), data, facts
+(steps, seconds, seed, validation figures). Loading needs no other file and runs no pickle.
 """
 
 import hashlib

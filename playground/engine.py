@@ -1,4 +1,4 @@
-"""The only door of the app, the command line and the notebooks: load once, run, check the deadline. numpy in, numpy out.
+"""The only door of the app, the command line and the notebooks: load once, run, mind the deadline. numpy throughout.
 
     engine = default_engine()
     tokenized = engine.tokenize(motion, "a person walks", "lgtok-lite")
@@ -204,7 +204,7 @@ def prepare(motion: Motion) -> tuple[NDArray[np.float32], Motion]:
     """A motion as un-normalised rows [F, 67], F a multiple of 4 and at most 196, and the F canonical poses of them."""
     if motion.skeleton != HUMAN22 or motion.fps != LIMITS.fps:
         raise PlaygroundError(
-            f"a tokenizer takes {HUMAN22.size} joints at {LIMITS.fps} frames a second, got {motion.skeleton.size} joints"
+            f"a tokenizer takes {HUMAN22.size} joints at {LIMITS.fps} frames a second, got {motion.skeleton.size}"
             f" at {motion.fps:g}; read the file with read_motion, which converts it"
         )
     rows = min(motion.frames - 1, LIMITS.max_frames) // UNIT * UNIT

@@ -62,7 +62,7 @@ class Runtime:
 
     def codebooks(self) -> list[Floats]:
         """Code vectors [V, D] of every scale."""
-        return [book.vectors.numpy().copy() for book in self.tokenizer.quantizer.codebooks]  # type: ignore[operator]
+        return [book.vectors.numpy().copy() for book in self.tokenizer.quantizer.codebooks]
 
     def encode(self, features: Floats, caption: str) -> tuple[tuple[LevelTokens, ...], QuantizedArrays]:
         """Un-normalised rows [F, 67] -> tokens, and the numbers behind them."""

@@ -1,7 +1,7 @@
 """Library -> training batches: weighted clips, windows, mirroring, speed changes, length buckets.
 
-A batch is a pure function of (seed, step): nothing is remembered between steps, so a run that is resumed at step k sees the
-same batches as one that never stopped, and every process of a distributed run takes its own slice of one global batch.
+A batch is a pure function of (seed, step): nothing is remembered between steps, so a run that is resumed at step k sees
+the same batches as one that never stopped, and every process of a distributed run takes its slice of one global batch.
 """
 
 from collections import Counter
@@ -78,7 +78,7 @@ def sample_weights(samples: Sequence[Sample], config: BatchConfig) -> NDArray[np
     actions = Counter((s.source, s.action) for s in samples)
     inside = Counter[str]()
     for (source, _), count in actions.items():
-        inside[source] += count ** (1 - config.action_balance)  # type: ignore[assignment]
+        inside[source] += count ** (1 - config.action_balance)
     weights = [
         sources[s.source] ** (1 - config.source_balance)
         * actions[s.source, s.action] ** (-config.action_balance)
@@ -121,7 +121,7 @@ class BatchSource:
         self.normaliser = normaliser
         self.config = config
         self.seed = seed
-        self._weights = sample_weights(self.samples, config)
+        self.weights = sample_weights(self.samples, config)
 
     def captions(self) -> list[str]:
         """Every caption a batch can hold, mirrored ones included."""
@@ -133,14 +133,15 @@ class BatchSource:
         c = self.config
         block, place = divmod(step, c.bucket)
         rng = np.random.default_rng([self.seed, block])
-        chosen = rng.choice(len(self.samples), size=c.size * c.bucket, p=self._weights)
-        cuts = [self._cut(self.samples[i], np.random.default_rng([self.seed, block, n])) for n, i in enumerate(chosen)]
+        chosen = rng.choice(len(self.samples), size=c.size * c.bucket, p=self.weights)
+        cuts = [self.cut(self.samples[i], np.random.default_rng([self.seed, block, n])) for n, i in enumerate(chosen)]
         cuts.sort(key=lambda cut: len(cut[0]))
         order = rng.permutation(c.bucket)
         start = int(order[place]) * c.size
-        return self._collate(cuts[start : start + c.size][rank::world])
+        return self.collate(cuts[start : start + c.size][rank::world])
 
-    def _cut(self, sample: Sample, rng: np.random.Generator) -> tuple[NDArray[np.float32], str, str]:
+    def cut(self, sample: Sample, rng: np.random.Generator) -> tuple[NDArray[np.float32], str, str]:
+        """One window of a sample: un-normalised rows [F, 67], caption, source."""
         c = self.config
         features, caption = sample.features, str(rng.choice(sample.captions)) if sample.captions else ""
         if rng.random() < c.speed:
@@ -151,7 +152,8 @@ class BatchSource:
             features, caption = mirror_features67(features), mirror_caption(caption)
         return features, caption, sample.source
 
-    def _collate(self, cuts: Sequence[tuple[NDArray[np.float32], str, str]]) -> Batch:
+    def collate(self, cuts: Sequence[tuple[NDArray[np.float32], str, str]]) -> Batch:
+        """Windows as one normalised, right-padded batch."""
         lengths = np.array([len(cut[0]) for cut in cuts], np.int64)
         features = np.zeros((len(cuts), int(lengths.max()), cuts[0][0].shape[1]), np.float32)
         for row, (rows, _, _) in enumerate(cuts):
@@ -167,4 +169,4 @@ def whole_batches(samples: Sequence[Sample], normaliser: Normaliser, size: int, 
     for sample in sorted(source.samples, key=lambda s: len(s.features)):
         length = min(len(sample.features), LIMITS.max_frames) // unit * unit
         cuts.append((sample.features[:length], next(iter(sample.captions), ""), sample.source))
-    return [source._collate(cuts[i : i + size]) for i in range(0, len(cuts), size)]
+    return [source.collate(cuts[i : i + size]) for i in range(0, len(cuts), size)]

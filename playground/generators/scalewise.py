@@ -1,7 +1,7 @@
-"""Scalable autoregression (MoSa's generator as LG-Tok uses it; arXiv 2602.08337, systems.md A9-A10), from config to sampling.
+"""Scalable autoregression: MoSa's generator as LG-Tok uses it (arXiv 2602.08337; systems.md A9-A10).
 
-Every scale is drawn at once, given all coarser scales: the running sum of the de-quantized scales so far, pooled to the next
-scale's length, is the input of that scale. The loop over scales is written once (`ScalewiseGenerator.steps`).
+Every scale is drawn at once, given all coarser scales: the running sum of the de-quantized scales so far, pooled to the
+next scale's length, is the input of that scale. The loop over scales is written once (`ScalewiseGenerator.steps`).
 """
 
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ class Layer(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class TextMemory:
-    """The text of one call, ready for every layer: keys and values of the rows with text, one constant for those without."""
+    """The text of one call, ready for every layer: keys and values for rows with text, a constant for rows without."""
 
     keys_values: list[tuple[Tensor, Tensor]]  # a layer: [B, H, W, head width] twice; empty list without any text
     mask: Tensor | None  # [B, W]
@@ -166,7 +166,7 @@ class ScalewiseTransformer(nn.Module):
         return parts[0] if len(parts) == 1 else torch.cat(parts)
 
     def forward(self, sums: list[Tensor], text: TextMemory) -> list[Tensor]:
-        """Teacher forcing: running sums [B, T, code width] after scales 1..N-1 -> logits [B, s_n, V_n] of every scale."""
+        """Teacher forcing: running sums [B, T, code width] after scales 1..N-1 -> logits [B, s_n, V_n] a scale."""
         inputs = [self.embed_start(text.length)]
         inputs += [self.embed_sums(total, level) for level, total in enumerate(sums, start=1)]
         x = torch.cat(inputs, dim=1)

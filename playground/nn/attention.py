@@ -1,7 +1,7 @@
 """Multi-head attention: self-attention with rotary positions and an optional cache, and cross-attention to a memory.
 
-Masks are boolean, True where a key is real, [B, S], or None when every key is real. The cache belongs to one call, never to
-a layer (habit after nanochat's KVCache and torchtune's kv_cache).
+Masks are boolean, True where a key is real, [B, S], or None when every key is real. The cache belongs to a call, never
+to a layer (habit after nanochat's KVCache and torchtune's kv_cache).
 """
 
 from dataclasses import dataclass, field

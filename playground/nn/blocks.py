@@ -101,8 +101,8 @@ class Block(nn.Module):
 class UStack(nn.Module):
     """Entry norm, an odd number of blocks with U-shaped skips, exit norm.
 
-    The outputs of the first half wait on a stack; before each block of the second half the stream is concatenated with the
-    popped one and mapped back to the width by that block's own linear layer. ValueError for an even depth with skips.
+    The outputs of the first half wait on a stack; before each block of the second half the stream is joined with
+    the popped one and mapped back to the width by that block's own linear layer. ValueError for an even depth with skips.
     """
 
     def __init__(
@@ -122,12 +122,12 @@ class UStack(nn.Module):
         super().__init__()
         if skips and depth % 2 == 0:
             raise ValueError(f"a stack with U-shaped skips needs an odd depth, got {depth}")
-        self.half = depth // 2 if skips else 0
+        self.paired = depth // 2 if skips else 0
         self.blocks = module_list(
             Block(width, heads, hidden, memories=memories, dropout=dropout, norm=norm, pre=pre, feed=feed)
             for _ in range(depth)
         )
-        self.merges = module_list(nn.Linear(2 * width, width) for _ in range(self.half))
+        self.merges = module_list(nn.Linear(2 * width, width) for _ in range(self.paired))
         self.entry = build_norm(norm, width)
         self.exit = build_norm(norm, width)
 
@@ -141,13 +141,13 @@ class UStack(nn.Module):
         """x [B, T, D] -> [B, T, D], or [2B, T, D] when a memory asks for a null branch of every row."""
         x = self.entry(x)
         waiting: list[Tensor] = []
-        first_merge = len(self.blocks) - self.half
+        first_merge = len(self.blocks) - self.paired
         for depth, block in enumerate(self.blocks):
             if depth >= first_merge:
                 x = self.merges[depth - first_merge](torch.cat([x, waiting.pop()], dim=-1))
             if mask is not None and mask.shape[0] < x.shape[0]:
                 mask = torch.cat([mask, mask])
             x = block(x, rotation, mask, memories)
-            if depth < self.half:
+            if depth < self.paired:
                 waiting.append(x)
         return self.exit(x)

@@ -21,6 +21,6 @@ def apply_rope(x: Tensor, rotation: Rotation) -> Tensor:
 
 
 def sinusoid(positions: Tensor, width: int) -> Tensor:
-    """Fixed sine/cosine table for positions [T] -> [T, width]: sines in even columns, cosines in odd ones, base 10000."""
+    """Fixed sine/cosine table for positions [T] -> [T, width]: sines in even columns, cosines in odd, base 10000."""
     cos, sin = rope_angles(positions, width, 10_000.0)
     return torch.stack([sin, cos], dim=-1).flatten(-2)

@@ -1,4 +1,4 @@
-"""Vector quantization: the one nearest-code lookup, EMA codebooks, and the multi-scale residual quantizer (systems.md A6).
+"""Vector quantization: the one nearest-code lookup, EMA codebooks, the multi-scale residual quantizer (systems.md A6).
 
 Ideas: VAR's multi-scale residual quantizer (MIT), EMA codebooks of VQ-VAE-2 and encodec (MIT); code written here.
 """
@@ -98,8 +98,8 @@ class Codebook(nn.Module):
 class Phi(nn.Module):
     """What an up-sampled scale passes through before it is added.
 
-    conv: twice convolution kernel 3 and ReLU without a residual path (A6, as released); residual: half the input plus half
-    a convolution (VAR); identity: the plain sum of the paper's text.
+    conv: twice convolution kernel 3 and ReLU without a residual path (A6, as released); residual: half the input plus
+    half a convolution (VAR); identity: the plain sum of the paper's text.
     """
 
     def __init__(self, width: int, kind: str) -> None:

@@ -1,8 +1,8 @@
 """LG-Tok's tokenizer and detokenizer (arXiv 2602.08337; systems.md A3-A8), read from config to decoding.
 
 encode: text, learned latents and motion frames go through one transformer; the latents that come out are quantized over
-growing scales. decode: frame queries look at the de-quantized latents and at the text; guidance decodes with and without
-text and extrapolates.
+growing scales. decode: frame queries look at the de-quantized latents and at the text; guidance decodes with and
+without text and extrapolates.
 """
 
 from dataclasses import dataclass
@@ -282,7 +282,7 @@ class LGTok(nn.Module):
     def forward(
         self, features: Tensor, lengths: Tensor, text: TextFeatures | None, dropped: Tensor | None = None
     ) -> TrainingOutput:
-        """One training pass: encode, quantize with straight-through gradients, decode. dropped: bool [B], no language."""
+        """One training pass: encode, quantize with straight-through gradients, decode. dropped: bool [B], no text."""
         z = self.latents(features, lengths, text, dropped)
         quantized = self.quantizer(z)
         memory = self._memory(len(lengths), text, dropped)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from playground.data.batches import BatchConfig
 from playground.errors import PlaygroundError
+from playground.generators.scalewise import GENERATOR_PRESETS, GeneratorConfig
 from playground.tokenizers.transformer import PRESETS, TokenizerConfig
 
 
@@ -46,6 +47,33 @@ TOKENIZERS: dict[str, TokenizerTraining] = {
         schedule=Schedule(steps=5_000),
         heading=0.5,
         masked_mean=True,
+    ),
+}
+
+
+@dataclass(frozen=True)
+class GeneratorTraining:
+    """One generator run (systems.md A10)."""
+
+    model: GeneratorConfig
+    tokenizer: str  # the tokenizer run whose checkpoint it draws from
+    batch: BatchConfig = field(default_factory=BatchConfig)
+    schedule: Schedule = field(default_factory=Schedule)
+    size: int = 32  # motions a batch
+    variants: int = 6  # windows tokenized of every clip
+    text: str = "minilm"
+    synthetic: float = 0.1
+    keep: float = 0.5  # share of the input tokens kept; the others become random codes
+    caption_drop: float = 0.1
+    seed: int = 0
+
+
+GENERATORS: dict[str, GeneratorTraining] = {
+    "lgtok-lite-generator": GeneratorTraining(
+        model=GENERATOR_PRESETS["lite"],
+        tokenizer="lgtok-lite-tokenizer",
+        batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
+        schedule=Schedule(steps=3_600, rate=6e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
     ),
 }
 

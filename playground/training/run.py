@@ -7,14 +7,19 @@ from typing import Any
 
 import torch
 
-from playground.data.batches import BatchSource, library_samples, synthetic_samples, whole_batches
+from playground.checkpoints import load_tokenizer
+from playground.data.batches import BatchConfig, BatchSource, library_samples, synthetic_samples, whole_batches
 from playground.data.library import Library
 from playground.errors import PlaygroundError
+from playground.generators.scalewise import GeneratorConfig, build_generator
+from playground.motion.representation import Normaliser
 from playground.motion.synthetic import corpus
-from playground.text.encoders import load_encoder
+from playground.progress import Progress
+from playground.text.encoders import check_same, load_encoder
 from playground.text.store import FeatureStore
-from playground.tokenizers.transformer import build_tokenizer
-from playground.training.configs import TOKENIZERS, TokenizerTraining, with_steps
+from playground.tokenizers.transformer import LGTok, build_tokenizer
+from playground.training.configs import GENERATORS, TOKENIZERS, GeneratorTraining, TokenizerTraining, with_steps
+from playground.training.generator import GeneratorTask, build_bank
 from playground.training.loop import Launch, fit, start_fabric
 from playground.training.tokenizer import TokenizerTask
 
@@ -36,11 +41,15 @@ def train(
     launch = launch or Launch()
     if config in TOKENIZERS:
         return _train_tokenizer(TOKENIZERS[config], library, out / "tokenizer", resume, steps, launch, on_step)
-    known = ", ".join([*TOKENIZERS])
+    if config in GENERATORS:
+        return _train_generator(GENERATORS[config], library, out, resume, steps, launch, on_step)
+    known = ", ".join([*TOKENIZERS, *GENERATORS])
     raise PlaygroundError(f"unknown training {config!r}; known are {known}")
 
 
-def training_batches(library: Library, config: Any, synthetic: float) -> BatchSource:
+def training_batches(
+    library: Library, config: Any, synthetic: float, normaliser: Normaliser | None = None
+) -> BatchSource:
     """Batches over the training split plus a share of the synthetic corpus."""
     samples = library_samples(library, "train")
     if not samples:
@@ -48,7 +57,7 @@ def training_batches(library: Library, config: Any, synthetic: float) -> BatchSo
     extra = round(len(samples) * synthetic)
     if extra:
         samples = samples + synthetic_samples(corpus(extra, seed=0))
-    return BatchSource(samples, library.normaliser, config.batch, config.seed)
+    return BatchSource(samples, normaliser or library.normaliser, config.batch, config.seed)
 
 
 def _train_tokenizer(
@@ -74,3 +83,46 @@ def _train_tokenizer(
         model = build_tokenizer(replace(config.model, text_width=encoder.width))
     task = TokenizerTask(model, config, batches, validation, store, encoder, library.name, fabric.device)
     return fit(fabric, task, config.schedule, out, resume=resume, on_step=on_step)
+
+
+def _train_generator(
+    config: GeneratorTraining,
+    library_path: Path,
+    out: Path,
+    resume: bool,
+    steps: int | None,
+    launch: Launch,
+    on_step: Callable[[int, float], None] | None,
+) -> dict[str, Any]:
+    tokenizer_path = out / "tokenizer" / "checkpoint.safetensors"
+    if not tokenizer_path.is_file():
+        raise PlaygroundError(f"{tokenizer_path} is absent; train {config.tokenizer} into the same folder first")
+    tokenizer, card = load_tokenizer(tokenizer_path)
+    library = Library.open(library_path)
+    config = replace(config, schedule=with_steps(config.schedule, steps))
+    fabric = start_fabric(launch, out / "generator")
+    encoder = load_encoder(config.text)
+    check_same(card.encoder, encoder)
+    batches = training_batches(library, config, config.synthetic, card.normaliser)
+    whole = BatchConfig(size=config.batch.size, whole=1.0, shorter=0.0, mirror=0.0)
+    samples = library_samples(library, "val")
+    held_out = BatchSource(samples, batches.normaliser, whole, config.seed) if samples else None
+    texts = [*batches.captions(), *(held_out.captions() if held_out else []), ""]
+    store = FeatureStore.cached(library_path, texts, encoder)
+    tokenizer = tokenizer.to(fabric.device)
+    with Progress("tokenizing the training clips") as progress:
+        bank = build_bank(tokenizer, batches, store, config.variants, fabric.device, progress)
+    checked = build_bank(tokenizer, held_out, store, 1, fabric.device) if held_out else None
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        model = build_generator(generator_config(config, tokenizer, encoder.width))
+    task = GeneratorTask(
+        model, tokenizer.quantizer, config, bank, checked, store, encoder, library.name, card.hash[:12], fabric.device
+    )
+    return fit(fabric, task, config.schedule, out / "generator", resume=resume, on_step=on_step)
+
+
+def generator_config(config: GeneratorTraining, tokenizer: LGTok, text_width: int) -> GeneratorConfig:
+    """The generator's config with the token shapes of its tokenizer and the width of its text encoder."""
+    c = tokenizer.config
+    return replace(config.model, scales=c.scales, codes=c.codes, code_width=c.code_width, text_width=text_width)

@@ -1,4 +1,4 @@
-"""The state of a run on disk: weights, optimiser and random state in one safetensors file, written whole or not at all."""
+"""The state of a run on disk: weights, optimiser and random state in one safetensors file, written whole or not."""
 
 import json
 import os

@@ -1,0 +1,177 @@
+"""Training the scale-wise generator on the tokens of a frozen tokenizer (systems.md A10)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from playground.checkpoints import Card, save_checkpoint
+from playground.data.batches import BatchSource
+from playground.generators.scalewise import ScalewiseTransformer, running_sums
+from playground.text.encoders import TextEncoder, TextFeatures, identify
+from playground.text.store import FeatureStore
+from playground.tokenizers.base import Tokens
+from playground.tokenizers.quantizers import MultiScaleQuantizer
+from playground.tokenizers.transformer import LGTok
+from playground.training.configs import GeneratorTraining
+
+
+@dataclass(frozen=True, eq=False)
+class TokenBank:
+    """Tokens of many windows of many clips, drawn once from the frozen tokenizer.
+
+    ids: int16 [n, sum of scales]; lengths: int64 [n] frames; captions: the text that guided each one; weights: [n].
+    """
+
+    ids: NDArray[np.int16]
+    lengths: NDArray[np.int64]
+    captions: list[str]
+    weights: NDArray[np.float64]
+
+
+def build_bank(
+    tokenizer: LGTok,
+    source: BatchSource,
+    texts: FeatureStore,
+    variants: int,
+    device: torch.device,
+    progress: Callable[[int, int], None] | None = None,
+) -> TokenBank:
+    """Tokenize `variants` windows of every sample (window, mirror and caption drawn anew) in evaluation mode."""
+    cuts = []
+    for index, sample in enumerate(source.samples):
+        for variant in range(variants):
+            cuts.append((index, *source.cut(sample, np.random.default_rng([source.seed, 2, index, variant]))))
+    cuts.sort(key=lambda cut: len(cut[1]))
+    rows: list[NDArray[np.int16]] = []
+    for start in range(0, len(cuts), source.config.size):
+        batch = source.collate([cut[1:] for cut in cuts[start : start + source.config.size]])
+        text = texts.lookup(batch.captions).to(device)
+        features, lengths = torch.from_numpy(batch.features).to(device), torch.from_numpy(batch.lengths).to(device)
+        tokens = tokenizer.encode(features, lengths, text).tokens
+        rows.append(torch.cat(tokens.ids, dim=1).cpu().numpy().astype(np.int16))
+        if progress:
+            progress(min(start + source.config.size, len(cuts)), len(cuts))
+    weights = np.array([source.weights[cut[0]] for cut in cuts])
+    lengths_all = np.array([len(cut[1]) for cut in cuts], np.int64)
+    return TokenBank(np.concatenate(rows), lengths_all, [cut[2] for cut in cuts], weights / weights.sum())
+
+
+class GeneratorInputs:
+    """One training batch on the device. Not a dataclass: Fabric would round its numbers to half precision."""
+
+    def __init__(self, ids: tuple[Tensor, ...], noisy: tuple[Tensor, ...], lengths: Tensor) -> None:
+        self.ids = ids  # clean targets, [B, s_n] a level
+        self.noisy = noisy  # inputs, some ids replaced
+        self.lengths = lengths  # int64 [B]
+        self.text: TextFeatures
+        self.dropped: Tensor  # bool [B], no text
+
+
+def generator_loss(logits: list[Tensor], ids: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+    """Mean cross-entropy of scales 1..N-1 plus that of scale N (A10), and the share of right arg-maxes; scalars."""
+    losses = [F.cross_entropy(part.flatten(0, 1).float(), i.flatten()) for part, i in zip(logits, ids, strict=True)]
+    right = [(part.argmax(dim=-1) == i).float().mean() for part, i in zip(logits, ids, strict=True)]
+    return torch.stack(losses[:-1]).mean() + losses[-1], torch.stack(right).mean()
+
+
+class GeneratorStep(nn.Module):
+    """One training pass, loss included: what Fabric wraps."""
+
+    def __init__(self, transformer: ScalewiseTransformer, quantizer: MultiScaleQuantizer) -> None:
+        super().__init__()
+        self.transformer = transformer
+        self._quantizer = [quantizer]  # in a list: frozen, not a part of what is trained
+
+    def forward(self, batch: GeneratorInputs) -> tuple[Tensor, Tensor]:
+        """A batch -> loss, share of right arg-maxes; scalars."""
+        quantizer = self._quantizer[0]
+        with torch.no_grad(), torch.autocast(batch.lengths.device.type, enabled=False):
+            sums = running_sums(quantizer, Tokens(batch.noisy, quantizer.codes))
+        memory = self.transformer.remember(batch.text, batch.lengths, dropped=batch.dropped)
+        return generator_loss(self.transformer(sums, memory), batch.ids)
+
+
+class GeneratorTask:
+    """One generator run on a token bank."""
+
+    def __init__(
+        self,
+        transformer: ScalewiseTransformer,
+        quantizer: MultiScaleQuantizer,
+        config: GeneratorTraining,
+        bank: TokenBank,
+        held_out: TokenBank | None,
+        texts: FeatureStore,
+        encoder: TextEncoder,
+        data: str,
+        tokenizer_hash: str,
+        device: torch.device,
+    ) -> None:
+        self.transformer = transformer
+        self.quantizer = quantizer
+        self.model = GeneratorStep(transformer, quantizer)
+        self.config = config
+        self.bank = bank
+        self.held_out = held_out
+        self.texts = texts
+        self.encoder = encoder
+        self.data = data
+        self.tokenizer_hash = tokenizer_hash
+        self.device = device
+
+    def _batch(self, bank: TokenBank, rows: NDArray[np.int64]) -> GeneratorInputs:
+        ids = torch.from_numpy(bank.ids[rows].astype(np.int64)).to(self.device).split(self.quantizer.scales, dim=1)
+        inputs = GeneratorInputs(tuple(ids), tuple(ids), torch.from_numpy(bank.lengths[rows]).to(self.device))
+        inputs.text = self.texts.lookup([bank.captions[row] for row in rows]).to(self.device)
+        inputs.dropped = torch.zeros(len(rows), dtype=torch.bool, device=self.device)
+        return inputs
+
+    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, float]]:
+        """Loss of the batch of `step`; draw, caption drop and token noise are functions of (seed, step)."""
+        c = self.config
+        rng = np.random.default_rng([c.seed, 3, step])
+        rows = rng.choice(len(self.bank.weights), size=c.size, p=self.bank.weights)
+        dropped = rng.random(c.size) < c.caption_drop
+        keep = [rng.random((c.size, size)) < c.keep for size in self.quantizer.scales]
+        other = [
+            rng.integers(0, v, (c.size, s)) for s, v in zip(self.quantizer.scales, self.quantizer.codes, strict=True)
+        ]
+        batch = self._batch(self.bank, rows[rank::world])
+        batch.dropped = torch.from_numpy(dropped[rank::world]).to(self.device)
+        noisy = []
+        for ids, kept, random in zip(batch.ids, keep, other, strict=True):
+            mask = torch.from_numpy(kept[rank::world]).to(self.device)
+            noisy.append(torch.where(mask, ids, torch.from_numpy(random[rank::world]).to(self.device)))
+        batch.noisy = tuple(noisy)
+        loss, right = model(batch)
+        return loss, {"right": float(right)}
+
+    @torch.no_grad()
+    def validate(self) -> dict[str, float]:
+        """Loss and share of right arg-maxes on the validation split, clean inputs, true captions."""
+        if self.held_out is None:
+            return {}
+        losses, rights, counts = [], [], []
+        for start in range(0, len(self.held_out.lengths), self.config.size):
+            rows = np.arange(start, min(start + self.config.size, len(self.held_out.lengths)))
+            loss, right = self.model(self._batch(self.held_out, rows))
+            losses.append(float(loss))
+            rights.append(float(right))
+            counts.append(len(rows))
+        return {
+            "val_loss": float(np.average(losses, weights=counts)),
+            "val_right": float(np.average(rights, weights=counts)),
+        }
+
+    def export(self, path: Path, facts: dict[str, Any]) -> None:
+        """Write the shipped form of the generator; it names the tokenizer whose tokens it draws."""
+        facts = facts | {"seed": self.config.seed, "tokenizer": self.tokenizer_hash}
+        card = Card("generator", self.transformer.config, identify(self.encoder), self.data, facts)
+        save_checkpoint(path, self.transformer, card)
