@@ -1,0 +1,96 @@
+"""The web app: five rooms behind tabs, one engine behind all of them. `build` makes the page, `launch` serves it.
+
+Importing this module imports no torch; the engine does so at the first live request (rule 14 of examples.md).
+"""
+
+import argparse
+import os
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+os.environ.setdefault("GRADIO_ANALYTICS_ENABLED", "False")  # before gradio is imported: it reads this once
+
+import gradio as gr
+
+from playground.limits import LIMITS
+from playground.ui.chart import chart_script, plotly_script
+from playground.ui.rooms import ROOMS
+from playground.ui.services import EngineSource, Services
+from playground.ui.theme import style_sheet, theme
+
+if TYPE_CHECKING:
+    from playground.engine import Engine
+
+TITLE = "Motion Token Playground"
+UPLOADS_CHECKED_EVERY = 600  # seconds between looks for old uploaded files
+UPLOADS_KEPT = 3600  # seconds an uploaded file is kept
+
+
+@lru_cache(maxsize=1)
+def _default_engine() -> "Engine":
+    from playground.engine import default_engine
+
+    return default_engine()
+
+
+def build(engine: EngineSource = _default_engine) -> gr.Blocks:
+    """The page. `engine` is called when something needs it first; a test passes its own."""
+    services = Services(engine)
+    with gr.Blocks(title=TITLE, delete_cache=(UPLOADS_CHECKED_EVERY, UPLOADS_KEPT), fill_width=True) as page:
+        gr.HTML(_header(), elem_id="mtp-header", apply_default_css=False, js_on_load="window.mtpHeader?.(element);")
+        with gr.Tabs(elem_id="mtp-rooms"):
+            for label, room in ROOMS.items():
+                name = label.lower().replace(" ", "-")
+                with gr.Tab(label, id=name, elem_id=f"room-{name}"):
+                    room(services)
+    page.queue(max_size=LIMITS.queue_size, default_concurrency_limit=1)
+    return page
+
+
+def launch(host: str = "127.0.0.1", port: int = 7860, engine: EngineSource = _default_engine) -> None:
+    """Serve the page until the process is stopped."""
+    gr.set_static_paths([plotly_script()])
+    build(engine).launch(
+        server_name=host,
+        server_port=port,
+        theme=theme(),
+        head=_head(),
+        max_file_size=LIMITS.max_upload_bytes,
+        footer_links=[],
+        show_error=True,
+        ssr_mode=False,
+        share=False,
+        quiet=True,
+        enable_monitoring=False,
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """`python -m playground.ui.app [--host HOST] [--port PORT]`."""
+    parser = argparse.ArgumentParser(description=f"Serve the {TITLE}.")
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, default=7860)
+    options = parser.parse_args(arguments)
+    launch(options.host, options.port)
+
+
+def _header() -> str:
+    """The line above the rooms: name, what it is in one sentence, the switch for light and dark."""
+    return (
+        f'<header class="mtp-header"><h1>{TITLE}</h1>'
+        "<p>Motions become tokens, tokens become motions; look at every step.</p>"
+        '<button type="button" class="mtp-dark" aria-label="Switch between light and dark" title="Light or dark">'
+        '<span aria-hidden="true">◐</span></button></header>'
+    )
+
+
+def _head() -> str:
+    """What goes into the page's head: our own style and scripts, inline (`css=` would rewrite our selectors)."""
+    page = (Path(__file__).parent / "page.js").read_text(encoding="utf-8")
+    return f"<style>{style_sheet()}</style><script>{page}</script><script>{chart_script()}</script>"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+/* Draws a Plotly figure (JSON text) in the page's own colours, light or dark, and reports clicks.
+ *
+ * Plotly itself is served by the playground and loaded once, after the page stands. A trace may carry
+ * meta.dark = {"marker.color": ...} with what changes in the dark; every other colour comes from the --mtp tokens.
+ * A click on a point that has customdata triggers 'pick' and rings that point in every panel of the chart; the figure's
+ * layout.meta.picked names the point that is ringed at first.
+ */
+(() => {
+  if (window.mtpChart) return;
+  let library = null;
+
+  function plotly(url) {
+    if (window.Plotly) return Promise.resolve(window.Plotly);
+    library ??= new Promise((resolve, reject) => {
+      const script = document.createElement('script');
+      script.src = new URL(url, document.baseURI).href;
+      script.onload = () => resolve(window.Plotly);
+      script.onerror = () => { library = null; reject(new Error('the chart library did not load')); };
+      document.head.appendChild(script);
+    });
+    return library;
+  }
+
+  const token = (name) => getComputedStyle(document.body).getPropertyValue(`--mtp-${name}`).trim();
+  const isDark = () => document.body.classList.contains('dark') || document.documentElement.classList.contains('dark');
+
+  function put(target, path, value) {
+    const keys = path.split('.');
+    const last = keys.pop();
+    for (const key of keys) target = target[key] ??= {};
+    target[last] = value;
+  }
+
+  function dressAxis(axis) {
+    return {
+      ...axis, gridcolor: token('line'), zerolinecolor: token('line'), linecolor: token('line-strong'),
+      tickcolor: token('line-strong'), tickfont: { ...axis.tickfont, color: token('muted') },
+    };
+  }
+
+  function dress(figure) {
+    const layout = {
+      ...figure.layout, autosize: true, paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
+      font: { size: 12, ...figure.layout?.font, color: token('text'), family: token('sans') },
+      hoverlabel: { ...figure.layout?.hoverlabel, bgcolor: token('surface'), bordercolor: token('line-strong'),
+                    font: { color: token('text'), family: token('sans'), size: 12 } },
+    };
+    delete layout.width;
+    delete layout.height;
+    for (const key of Object.keys(layout)) if (/^[xy]axis\d*$/.test(key)) layout[key] = dressAxis(layout[key]);
+    if (layout.template?.layout) {
+      for (const key of ['xaxis', 'yaxis']) layout[key] ??= dressAxis({});
+    }
+    const data = figure.data.map((trace) => {
+      const copy = structuredClone(trace);
+      if (isDark() && copy.meta?.dark) for (const [path, value] of Object.entries(copy.meta.dark)) put(copy, path, value);
+      return copy;
+    });
+    return { data, layout };
+  }
+
+  const first = (entry) => String([entry].flat()[0]);
+
+  // Rings round the point `id`, one in each panel that has it.
+  function rings(data, id) {
+    return data.flatMap((trace) => {
+      const at = Array.isArray(trace.customdata) ? trace.customdata.findIndex((entry) => first(entry) === id) : -1;
+      if (at < 0) return [];
+      return [{ type: 'scatter', mode: 'markers', x: [trace.x[at]], y: [trace.y[at]], xaxis: trace.xaxis, yaxis: trace.yaxis,
+                hoverinfo: 'skip', showlegend: false, cliponaxis: false,
+                marker: { size: 18, symbol: 'circle-open', color: token('text'), line: { width: 3 } } }];
+    });
+  }
+
+  window.mtpChart = (element, props, trigger, watch) => {
+    const box = element.querySelector('.mtp-chart');
+    let picked = null;
+
+    async function draw() {
+      if (!props.value || !box.isConnected || box.clientWidth === 0) return;
+      const text = props.value;
+      const Plotly = await plotly(props.plotly_url);
+      if (text !== props.value || box.clientWidth === 0) return;
+      const figure = JSON.parse(text);
+      const { data, layout } = dress(figure);
+      const ringed = picked ?? figure.layout?.meta?.picked;
+      if (ringed !== undefined && ringed !== null) data.push(...rings(data, String(ringed)));
+      layout.height = box.clientHeight || undefined;
+      await Plotly.react(box, data, layout, { displayModeBar: false, responsive: true, doubleClick: 'reset' });
+      box.dataset.drawn = String(Number(box.dataset.drawn || 0) + 1);
+      if (!box.mtpListening) {
+        box.mtpListening = true;
+        box.on('plotly_click', (event) => {
+          const hit = event.points.find((point) => point.customdata !== undefined && point.customdata !== null);
+          if (!hit) return;
+          picked = first(hit.customdata);
+          trigger('pick', { id: picked });
+          redraw();
+        });
+      }
+    }
+
+    const redraw = () => draw().catch((error) => { box.textContent = error.message; });
+    watch('value', () => { picked = null; redraw(); });
+    let width = 0;
+    new ResizeObserver(() => {
+      if (box.clientWidth === width) return;
+      width = box.clientWidth;
+      redraw();
+    }).observe(box);
+    new MutationObserver(redraw).observe(document.body, { attributes: true, attributeFilter: ['class'] });
+    redraw();
+  };
+})();

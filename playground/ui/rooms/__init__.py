@@ -1,0 +1,12 @@
+"""The rooms of the app, in the order of their tabs. Each module has `room(services)`, which builds its room."""
+
+from collections.abc import Callable
+
+from playground.ui.rooms import generate, guidance, tokenize
+from playground.ui.services import Services
+
+ROOMS: dict[str, Callable[[Services], None]] = {
+    "Tokenize": tokenize.room,
+    "Generate": generate.room,
+    "Guidance": guidance.room,
+}

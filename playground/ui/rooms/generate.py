@@ -1,0 +1,172 @@
+"""Room 4: a motion from words, appearing scale by scale while it is generated."""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gradio as gr
+import numpy as np
+
+from playground.limits import LIMITS
+from playground.text.prompts import normalise
+from playground.ui.errors import Noted, attach, message_place
+from playground.ui.facts import Fact, significant
+from playground.ui.layout import LEAVE_AFTER, panel, room_frame, stage_and_score, words
+from playground.ui.scenes import generated_scene, token_facts
+from playground.ui.services import Services
+from playground.ui.uploads import checked_number
+from playground.ui.view import View, first_view
+
+LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens with every one of them."
+PROMPTS = (
+    "a person walks forward and waves",
+    "someone jogs, then stops",
+    "a person turns left while walking",
+    "a person raises the right hand",
+)
+ENTROPY_CARD = (
+    "How undecided the generator was, on average over its tokens: at 0 bit one code was certain, at 3 bit it was like "
+    "drawing one of eight. Faint cells are unsure ones."
+)
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is asked of the generator, checked."""
+
+    prompt: str | None
+    seconds: float
+    seed: int
+    guidance: float
+    cfg: float
+    temperature: float
+    top_k: float
+    top_p: float
+
+    @classmethod
+    def checked(cls, prompt: object, free: object, *numbers: object) -> "Wish":
+        """From the controls as they come; PlaygroundError with one sentence for what does not fit."""
+        words = None if free is True else normalise(prompt)  # type: ignore[arg-type]
+        bounds = (
+            ("the length in seconds", LIMITS.min_seconds, LIMITS.max_seconds),
+            ("the seed", 0, LIMITS.max_seed),
+            ("the decoder's guidance", 0, LIMITS.max_guidance),
+            ("the generator's guidance", 0, LIMITS.max_guidance),
+            ("the temperature", 0, LIMITS.max_temperature),
+            ("top-k", 0.01, 1),
+            ("top-p", 0.05, 1),
+        )
+        seconds, seed, *rest = (checked_number(n, *bound) for n, bound in zip(numbers, bounds, strict=True))
+        return cls(words, seconds, int(seed), *rest)
+
+
+@dataclass
+class Progress:
+    """How far one visitor's generation has come."""
+
+    level: int = 0
+    count: int = 0
+
+
+def stream(services: Services, wish: Wish) -> Iterator[View]:
+    """One view after every scale; the last one is the result."""
+    began = time.perf_counter()
+    engine, system = services.engine(), services.default_system()
+    sizes, palettes = services.scales(system.name), services.palettes(system.name)
+    steps = engine.generate_steps(
+        wish.prompt, wish.seconds, system=system.name, seed=wish.seed, guidance=wish.guidance, cfg=wish.cfg,
+        temperature=wish.temperature, top_k=wish.top_k, top_p=wish.top_p,
+    )  # fmt: skip
+    for step in steps:
+        yield View(
+            stage=generated_scene(system, step.motion, step.levels, step.entropy, palettes, sizes),
+            facts=(*token_facts(step.levels), entropy_fact(step.entropy)),
+            controls={"prompt": wish.prompt or "", "level": len(step.levels), "count": len(sizes)},
+            seconds=time.perf_counter() - began,
+        )
+
+
+def entropy_fact(entropy: Sequence[Any]) -> Fact:
+    """Mean entropy over all tokens so far."""
+    mean = (
+        float(np.concatenate([np.asarray(row, np.float64) for row in entropy]).mean()) if len(entropy) else float("nan")
+    )
+    return Fact(f"{significant(mean)} bit", "mean entropy", ENTROPY_CARD)
+
+
+def opening_view(services: Services) -> View:
+    """The room's first result: the first prompt, seed 0, four seconds."""
+    *_, last = stream(services, Wish.checked(PROMPTS[0], False, 4.0, 0, 2.0, 4.0, 1.0, 0.2, 0.95))
+    return last
+
+
+def room(services: Services) -> None:
+    """Build the room inside the current tab."""
+    opening = first_view("generate", lambda: opening_view(services))
+    progress = gr.State(Progress(), time_to_live=LEAVE_AFTER)
+    with room_frame("generate"):
+        stage = stage_and_score("generate", opening)
+        with panel("Words become a motion", LEAD):
+            prompt = gr.Textbox(
+                opening.controls.get("prompt", PROMPTS[0]), label="Prompt", lines=2, max_lines=3,
+                placeholder=PROMPTS[0], elem_id="generate-prompt",
+            )  # fmt: skip
+            gr.Examples([[text] for text in PROMPTS], [prompt], label="Try one of these", elem_id="generate-examples")
+            with gr.Row(elem_classes=["mtp-line"]):
+                seconds = gr.Slider(
+                    LIMITS.min_seconds, LIMITS.max_seconds, value=4.0, step=0.2, label="Seconds",
+                    elem_id="generate-seconds", min_width=160,
+                )  # fmt: skip
+                seed = gr.Number(
+                    0, label="Seed", precision=0, minimum=0, maximum=LIMITS.max_seed, elem_id="generate-seed",
+                    min_width=80, scale=0,
+                )  # fmt: skip
+            with gr.Row(elem_classes=["mtp-line"]):
+                go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
+                cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
+            message = message_place("generate-message")
+            facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
+            knobs = _knobs()
+        words("generate")
+
+    def generate(*values: Any) -> Iterator[tuple[Any, ...]]:
+        for view in stream(services, Wish.checked(*values)):
+            level, count = view.controls["level"], view.controls["count"]
+            note = f"Choosing tokens: scale {level} of {count} is done." if level < count else ""
+            yield Noted(view.stage_json(), note), view.facts_html(), Progress(level, count)
+
+    def stopped(made: Progress | None) -> tuple[Any, ...]:
+        done = made or Progress()
+        text = f"Stopped; this is the motion after scale {done.level} of {done.count}."
+        return (Noted(gr.skip(), text if 0 < done.level < done.count else "Stopped before the first scale was done."),)
+
+    free, *numbers = knobs
+    inputs = [prompt, free, seconds, seed, *numbers]
+    runs = []
+    for event in (go.click, prompt.submit):
+        busy = event(_switch(True), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
+        run = attach(busy.then, generate, inputs, [stage, facts, progress], message)
+        run.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
+        runs.append(run)
+    halt = attach(cancel.click, stopped, [progress], [stage], message, cancels=runs)
+    halt.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
+
+
+def _switch(running: bool) -> Any:
+    """A handler that enables "Generate" or "Stop", whichever makes sense now."""
+    return lambda: (gr.update(interactive=not running), gr.update(interactive=running))
+
+
+def _knobs() -> list[Any]:
+    """The folded sampling controls in the order of `Wish.checked`; the first one is free-form."""
+    with gr.Accordion("Sampling", open=False, elem_classes=["mtp-knobs"]):
+        free = gr.Checkbox(False, label="Without any prompt (free-form)", elem_id="generate-free")
+        guidance = gr.Slider(0, LIMITS.max_guidance, 2.0, step=0.1, label="Guidance of the decoder, g")
+        cfg = gr.Slider(0, LIMITS.max_guidance, 4.0, step=0.1, label="Guidance of the generator, s (at the last scale)")
+        temperature = gr.Slider(
+            0, LIMITS.max_temperature, 1.0, step=0.05, label="Temperature (0 takes the likeliest code)"
+        )
+        top_k = gr.Slider(0.01, 1, 0.2, step=0.01, label="Top-k, share of the codes that may be chosen")
+        top_p = gr.Slider(0.05, 1, 0.95, step=0.01, label="Top-p, probability mass that may be chosen from")
+    return [free, guidance, cfg, temperature, top_k, top_p]

@@ -1,0 +1,85 @@
+"""Room 5: what the guidance scale g does to one motion, live in the browser and at five fixed values."""
+
+import time
+from typing import Any
+
+import gradio as gr
+
+from playground.limits import LIMITS
+from playground.ui.errors import attach, message_place
+from playground.ui.layout import panel, room_frame, stage_and_score, words
+from playground.ui.scenes import guidance_scene, token_facts
+from playground.ui.services import Services
+from playground.ui.stage.component import stage_call
+from playground.ui.uploads import checked_number
+from playground.ui.view import View, first_view
+
+LEAD = (
+    "The same tokens are decoded twice, with the caption and without. g pushes the result away from the wordless one: "
+    "drag it and watch the first figure; the others stay at 0 to 4."
+)
+DIFFERENCE = (
+    "Not the generator's guidance: that one steers which tokens are chosen. Here the tokens stay as they are and only "
+    "their reading changes."
+)
+FIRST = 2.0
+DOING = "Decoding twice"
+
+
+def run(services: Services, example_id: str, caption: str, g: float = FIRST) -> View:
+    """Tokenize an example and decode it with and without the caption; the live figure stands at g."""
+    began = time.perf_counter()
+    engine, system = services.engine(), services.default_system()
+    tokenized = engine.tokenize(services.example(example_id).motion(), caption, system=system.name)
+    pair = engine.guidance_pair(tokenized, caption)
+    return View(
+        stage=guidance_scene(system, tokenized.motion, tokenized.levels, pair, services.palettes(system.name), g),
+        facts=token_facts(tokenized.levels),
+        controls={"example": example_id, "caption": tokenized.caption},
+        seconds=time.perf_counter() - began,
+    )
+
+
+def opening_view(services: Services) -> View:
+    """The room's first result: the first example with its own caption."""
+    example = services.opening_example()
+    return run(services, example.id, example.caption)
+
+
+def room(services: Services) -> None:
+    """Build the room inside the current tab."""
+    opening = first_view("guidance", lambda: opening_view(services))
+    with room_frame("guidance"):
+        stage = stage_and_score("guidance", opening)
+        with panel("What g does", LEAD):
+            g = gr.Slider(0, LIMITS.max_guidance, FIRST, step=0.05, label="g", elem_id="guidance-g")
+            gr.HTML('<p class="mtp-formula">m = (1 + g) · m<sub>words</sub> − g · m<sub>wordless</sub></p>')
+            example = gr.Dropdown(
+                services.example_choices(),
+                value=opening.controls.get("example"),
+                label="Motion",
+                elem_id="guidance-example",
+            )
+            with gr.Row(elem_classes=["mtp-line"]):
+                caption = gr.Textbox(
+                    opening.controls.get("caption", ""), label="Caption", max_lines=1,
+                    elem_id="guidance-caption", scale=1, min_width=120,
+                )  # fmt: skip
+                go = gr.Button("Decode", variant="primary", size="sm", scale=0, min_width=72, elem_id="guidance-go")
+            message = message_place("guidance-message")
+            facts = gr.HTML(opening.facts_html(), elem_id="guidance-facts", apply_default_css=False)
+            gr.HTML(f'<p class="mtp-aside">{DIFFERENCE}</p>', apply_default_css=False)
+        words("guidance")
+
+    def choose(wanted: str, at: float) -> tuple[Any, ...]:
+        return again(wanted, services.example(wanted).caption, at)
+
+    def again(wanted: str, text: str, at: float) -> tuple[Any, ...]:
+        view = run(services, wanted, text, checked_number(at, "g", 0, LIMITS.max_guidance))
+        return view.stage_json(), view.facts_html(), view.controls["caption"]
+
+    shown = [stage, facts, caption]
+    attach(example.input, choose, [example, g], shown, message, stage="guidance", doing=DOING)
+    for event in (caption.submit, go.click):
+        attach(event, again, [example, caption, g], shown, message, stage="guidance", doing=DOING)
+    g.change(None, [g], None, js=stage_call("guidance", "setGuidance"), api_visibility="private")

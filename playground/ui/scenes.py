@@ -1,0 +1,89 @@
+"""What stands on the stage in each room: payloads of figures/stage.py made from what the engine returns."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from playground.figures import stage as scene
+from playground.figures.stage import NOT_FRAMES, ORIGINAL_ID, Json
+from playground.motion.motion import Motion
+from playground.ui.facts import Fact, bits, bits_text, millimetres
+
+if TYPE_CHECKING:
+    from playground.engine import Decoded, GuidancePair, SystemInfo, Tokenized
+
+MPJPE_CARD = (
+    "Mean per-joint position error: how far a joint is from where it was, on average over joints and frames, with the "
+    "pelvis of both figures put on the same spot."
+)
+TOKENS_CARD = "How many codes the motion was written with, over all scales used."
+BITS_CARD = "What it takes to write these tokens down: log2 of the codebook size for each token, added up."
+FIXED_GUIDANCE = (0, 1, 2, 3, 4)
+
+
+def score(
+    system: "SystemInfo",
+    frames: int,
+    levels: Sequence[Any],
+    palettes: Sequence[Any] | None = None,
+    entropy: Sequence[Any] | None = None,
+    sizes: Sequence[tuple[int, int]] = (),
+) -> Json:
+    """The score of one motion: LevelTokens `levels` as rows. The scales of `sizes`, (tokens, codes) each, that have no
+    tokens yet are drawn empty. palettes: colours uint8 [codes, 3] a scale."""
+    rows = []
+    for n, level in enumerate(levels):
+        colors = palettes[n] if palettes else None
+        rows.append(scene.level(level.ids, level.codes, colors, entropy[n] if entropy else None))
+    rows += [scene.level(None, codes, size=size) for size, codes in sizes[len(levels) :]]
+    return scene.track(system.name, system.title, frames, rows, NOT_FRAMES)
+
+
+def tokenized_scene(
+    system: "SystemInfo", tokenized: "Tokenized", decoded: "Decoded", palettes: Sequence[Any] | None
+) -> Json:
+    """The original and what its tokens give back, with the score."""
+    original = scene.figure(ORIGINAL_ID, "Original", tokenized.motion.joints)
+    error = f"MPJPE {millimetres(decoded.mpjpe_mm)}"
+    rebuilt = scene.figure(
+        "rebuilt", f"From tokens ({system.title})", decoded.motion.joints, system.name, error, ghost_of=ORIGINAL_ID
+    )
+    track = score(system, tokenized.motion.frames, tokenized.levels, palettes)
+    return scene.payload([original, rebuilt], [track])
+
+
+def generated_scene(
+    system: "SystemInfo", motion: Motion, levels: Sequence[Any], entropy: Sequence[Any], palettes: Sequence[Any] | None,
+    sizes: Sequence[tuple[int, int]],
+) -> Json:  # fmt: skip
+    """A generated motion after some scales; `sizes` says which scales are still to come."""
+    caption = f"scale {len(levels)} of {len(sizes)}" if len(levels) < len(sizes) else ""
+    made = scene.figure("made", "Generated", motion.joints, system.name, caption)
+    return scene.payload([made], [score(system, motion.frames, levels, palettes, entropy=entropy, sizes=sizes)])
+
+
+def guidance_scene(
+    system: "SystemInfo", motion: Motion, levels: Sequence[Any], pair: "GuidancePair", palettes: Sequence[Any] | None,
+    guidance: float,
+) -> Json:  # fmt: skip
+    """One motion at the slider's guidance and at five fixed ones, all recovered in the browser from both decodes."""
+    frames = len(pair.conditional)
+    figures = [scene.figure("live", "Your g", None, system.name, g="live", frames=frames)]
+    for g in FIXED_GUIDANCE:
+        figures.append(scene.figure(f"g{g}", f"g = {g}", None, system.name, g=g, frames=frames))
+    features = scene.features("live", pair.conditional, pair.unconditional, pair.mean, pair.std, guidance)
+    return scene.payload(figures, [score(system, motion.frames, levels, palettes)], features)
+
+
+def token_facts(levels: Sequence[Any], used: int | None = None) -> tuple[Fact, ...]:
+    """Token count and bits of the first `used` scales."""
+    kept = list(levels)[:used]
+    sizes, codes = [int(level.size) for level in kept], [int(level.codes) for level in kept]
+    return (
+        Fact(f"{sum(sizes):,}", "tokens", TOKENS_CARD),
+        Fact(bits_text(bits(sizes, codes)), "to store", BITS_CARD),
+    )
+
+
+def error_fact(decoded: "Decoded") -> Fact:
+    """MPJPE of one clip."""
+    return Fact(millimetres(decoded.mpjpe_mm), "MPJPE, this clip", MPJPE_CARD)

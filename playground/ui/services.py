@@ -1,0 +1,72 @@
+"""What every room is handed: the engine, opened once and late, and what is known without it."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from playground.errors import PlaygroundError
+from playground.figures.stage import code_colors
+from playground.motion.motion import Motion
+
+if TYPE_CHECKING:
+    from playground.engine import Engine, Example, SystemInfo
+
+EngineSource = Callable[[], "Engine"]
+KIND_WORDS = {"synthetic": "synthetic", "generated": "generated here", "decoded clip": "recorded, kept as tokens"}
+
+
+class Services:
+    """The rooms' door to the engine. Making one opens nothing."""
+
+    def __init__(self, engine: EngineSource) -> None:
+        self._source = engine
+        self._palettes: dict[str, list[NDArray[np.uint8]]] = {}
+
+    def engine(self) -> "Engine":
+        """The engine; opening it the first time may take a second."""
+        return self._source()
+
+    def examples(self) -> list["Example"]:
+        """The example library in the order to show it; empty if there is none."""
+        return list(self.engine().examples())
+
+    def example(self, wanted: str) -> "Example":
+        """The example of that id; PlaygroundError if there is none."""
+        for example in self.examples():
+            if example.id == wanted:
+                return example
+        raise PlaygroundError("that example is not in the library any more; choose another one")
+
+    def example_motion(self, wanted: str) -> Motion:
+        """The motion of an example."""
+        return self.example(wanted).motion()
+
+    def example_choices(self) -> list[tuple[str, str]]:
+        """(what the menu says, id) of every example."""
+        return [(f"{e.title} · {KIND_WORDS.get(e.kind, e.kind)}", e.id) for e in self.examples()]
+
+    def opening_example(self) -> "Example":
+        """The example that the page opens with: the first of the library; PlaygroundError if it is empty."""
+        found = self.examples()
+        if not found:
+            raise PlaygroundError("the example library is not here; upload a motion to begin")
+        return found[0]
+
+    def palettes(self, system: str) -> list[NDArray[np.uint8]]:
+        """Colours uint8 [codes, 3] of every scale's codebook, so that near codes look near."""
+        if system not in self._palettes:
+            self._palettes[system] = [code_colors(codes) for codes in self.engine().codebooks(system)]
+        return self._palettes[system]
+
+    def scales(self, system: str) -> list[tuple[int, int]]:
+        """(tokens, codes) of every scale of a system."""
+        return [(int(size), int(codes)) for size, codes in self.engine().scales(system)]
+
+    def default_system(self) -> "SystemInfo":
+        """The first system with a shipped checkpoint; PlaygroundError if none is shipped."""
+        for system in self.engine().systems():
+            if system.checkpoint == "shipped":
+                return system
+        raise PlaygroundError("no trained system is shipped with this copy; train one with: make train")

@@ -1,0 +1,136 @@
+"""A stand-in for the engine with the same methods and no model: the same input always gives the same random tokens.
+
+It lets the rooms be tested without torch. What it "decodes" is the motion it was given, shaken less and less the more
+scales are used, so that the error falls with every scale as the real one does.
+"""
+
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from playground.engine import check_generation, prepare
+from playground.motion.measures import mpjpe
+from playground.motion.motion import Motion
+from playground.motion.representation import to_features67
+from playground.motion.synthetic import corpus
+from playground.results import Decoded, Example, GenerationStep, GuidancePair, Tokenized
+from playground.systems import SystemInfo
+from playground.text.prompts import normalise
+from playground.tokenizers.token_file import LevelTokens
+
+SIZES = (1, 2, 3, 4, 6, 8, 12, 18, 26, 36)
+CODES = (128, 128, 192, 192, 256, 256, 320, 320, 384, 384)
+KINDS = ("synthetic", "generated", "decoded clip")
+
+
+@lru_cache(maxsize=1)
+def motions() -> list[Motion]:
+    """A handful of synthetic motions with their first captions."""
+    made = corpus(6, seed=4)
+    return [replace(one.motion, caption=one.captions[0], name=one.captions[0]) for one in made]
+
+
+def tokens(seed: int) -> tuple[LevelTokens, ...]:
+    """Random tokens of all scales."""
+    rng = np.random.default_rng(seed)
+    return tuple(LevelTokens(s, c, rng.integers(0, c, s)) for s, c in zip(SIZES, CODES, strict=True))
+
+
+class FakeEngine:
+    """What the rooms use of the engine. `pause` is called before every scale of a generation."""
+
+    def __init__(self, pause: Callable[[], None] = lambda: None) -> None:
+        self.pause = pause
+        self.calls: list[str] = []
+
+    def systems(self) -> list[SystemInfo]:
+        facts: dict[str, Any] = {}
+        name, text = "LG-Tok transformer", "minilm"
+        return [
+            SystemInfo("lgtok-lite", "LG-Tok lite", "lgtok", name, "sar", text, 13_000_000, "none", "shipped", facts)
+        ]
+
+    def scales(self, system: str) -> list[tuple[int, int]]:
+        return list(zip(SIZES, CODES, strict=True))
+
+    def codebooks(self, system: str) -> list[NDArray[np.float64]]:
+        rng = np.random.default_rng(3)
+        return [rng.normal(size=(codes, 8)) for codes in CODES]
+
+    def examples(self) -> list[Example]:
+        return [
+            Example(
+                f"m{n}",
+                motion.name.capitalize(),
+                motion.caption,
+                "walk",
+                KINDS[n % 3],
+                "made up",
+                partial(_same, motion),
+            )
+            for n, motion in enumerate(motions())
+        ]
+
+    def tokenize(self, motion: Motion, caption: str = "", system: str = "lgtok-lite") -> Tokenized:
+        self.calls.append("tokenize")
+        caption = normalise(caption, what="caption", allow_empty=True)
+        _, cut = prepare(motion)
+        levels = tokens(zlib.crc32(cut.joints.tobytes() + caption.encode()))
+        scale = np.linspace(1, 0.2, len(SIZES))[:, None, None]
+        per_level = (np.random.default_rng(0).normal(size=(len(SIZES), 36, 16)) * scale).astype(np.float32)
+        energy = np.concatenate([[1.0], 0.7 * 0.7 ** np.arange(len(SIZES))]).astype(np.float32)
+        return Tokenized(system, "fake", caption, cut, levels, energy, per_level.sum(axis=0), per_level, 0.05)
+
+    def reconstruct(
+        self, tokenized: Tokenized, guidance: float = 0.0, scales: int | None = None, caption: str | None = None
+    ) -> Decoded:
+        self.calls.append(f"reconstruct {scales}")
+        used = scales or len(SIZES)
+        motion = _shaken(tokenized.motion, 0.3 * 0.75**used)
+        error = mpjpe(tokenized.motion.joints, motion.joints)
+        return Decoded(motion, _features(motion), error, guidance, used, 0.04)
+
+    def generate_steps(
+        self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, guidance: float = 2.0,
+        cfg: float = 4.0, temperature: float = 1.0, top_k: float = 0.2, top_p: float = 0.95, **rest: Any,
+    ) -> Iterator[GenerationStep]:  # fmt: skip
+        self.calls.append("generate")
+        text = None if prompt is None else normalise(prompt)
+        frames = check_generation(seconds, seed, guidance, cfg, temperature, top_k, top_p)
+        levels = tokens(zlib.crc32(f"{text}{seed}".encode()))
+        source = motions()[zlib.crc32(f"{text}".encode()) % len(motions())]
+        clean = replace(source, joints=np.resize(source.joints, (frames, 22, 3)))
+        rng = np.random.default_rng(1)
+        entropy: list[NDArray[np.float32]] = []
+        for n in range(1, len(levels) + 1):
+            self.pause()
+            entropy.append(rng.uniform(0, 5, SIZES[n - 1]).astype(np.float32))
+            yield GenerationStep(n, levels[:n], tuple(entropy), _shaken(clean, 0.4 * 0.7**n))
+
+    def guidance_pair(self, result: Tokenized, caption: str | None = None) -> GuidancePair:
+        self.calls.append("guidance_pair")
+        worded, wordless = _features(result.motion), _features(_shaken(result.motion, 0.02))
+        mean, std = worded.mean(axis=0), worded.std(axis=0) + np.float32(1e-2)
+        return GuidancePair((worded - mean) / std, (wordless - mean) / std, mean, std)
+
+
+def _same(motion: Motion) -> Motion:
+    return motion
+
+
+def _shaken(motion: Motion, size: float) -> Motion:
+    """The motion with every joint off by a smooth wobble of `size` metres."""
+    rng = np.random.default_rng(7)
+    phase = rng.uniform(0, 2 * np.pi, (22, 3))
+    time = np.arange(motion.frames)[:, None, None] / 20
+    return replace(motion, joints=(motion.joints + size * 0.3 * np.sin(2 * time + phase)).astype(np.float32))
+
+
+def _features(motion: Motion) -> NDArray[np.float32]:
+    """[F, 67] of F poses, the last one standing for its own step."""
+    return to_features67(np.concatenate([motion.joints, motion.joints[-1:]]))
