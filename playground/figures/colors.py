@@ -55,7 +55,7 @@ _STEP_DASH = ("solid", "dash", "dot", "dashdot")
 
 
 def family_of(system: str | None) -> str | None:
-    """The family that a system's name starts with ("momask++-lite" -> "momask++"); None for the original or a stranger."""
+    """The family that a system's name starts with: "momask++-lite" -> "momask++"; None where it is none of ours."""
     name = re.sub(r"[^a-z0-9+]", "", (system or "").lower())
     name = re.sub(r"^momask(pp|plusplus)", "momask++", name)
     found = [family for family in FAMILIES if name.startswith(family)]

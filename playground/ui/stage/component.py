@@ -35,8 +35,6 @@ _MODULES = (
     "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "figures", "rows", "score",
     "timeline", "toolbar", "gestures", "keys", "index",
 )  # fmt: skip
-_EXPORTS = ("mount", "get", "adoptScore", "guidedJoints", "recoverJoints", "decodePayload")
-
 _ON_LOAD = """
 const options = JSON.parse(props.options);
 options.onEvent = (event, detail) => {
@@ -59,8 +57,11 @@ def stage_component(
     autoplay: bool = True,
     **settings: Any,
 ) -> gr.HTML:
-    """A stage inside a Blocks context: a gr.HTML whose value is a payload, as a dict or as JSON text. name: one word, unique on the page, by which stage_call and score_slot find it;
-    height: of the figures in CSS pixels; empty: what to say while there is nothing; settings go to gr.HTML."""
+    """A stage inside a Blocks context: a gr.HTML whose value is a payload, as a dict or as JSON text.
+
+    name: one word, unique on the page, by which stage_call and score_slot find it; height: of the figures, CSS pixels;
+    empty: what to say while there is nothing; settings go to gr.HTML.
+    """
     options: dict[str, Any] = {"name": name, "height": height, "autoplay": autoplay}
     if empty is not None:
         options["empty"] = empty
@@ -100,17 +101,22 @@ def stage_call(name: str, method: str, *arguments: Any) -> str:
 @lru_cache(maxsize=1)
 def stage_script() -> str:
     """All modules as one classic script: it defines window.MotionStage once a page and brings its style sheet along."""
-    parts = []
-    for module in _MODULES:
-        source = (_HERE / f"{module}.js").read_text(encoding="utf-8")
-        source = re.sub(r"^import [^;]*;\n", "", source, flags=re.MULTILINE)
-        parts.append(re.sub(r"^export (?=(?:async )?(?:function|class|const|let)\b)", "", source, flags=re.MULTILINE))
+    modules = "".join(_module(name) for name in _MODULES)
     style = json.dumps((_HERE / "stage.css").read_text(encoding="utf-8")).replace("</", "<\\/")
     return (
-        "window.MotionStage ??= (() => {\n"
-        + "\n".join(parts)
-        + f"\ndocument.head.append(el('style', {{ text: {style} }}));\nreturn {{ {', '.join(_EXPORTS)} }};\n}})();\n"
+        f"window.MotionStage ??= (() => {{\n{modules}"
+        f"document.head.append(module_dom.el('style', {{ text: {style} }}));\n"
+        "return { ...module_index, ...module_guidance };\n})();\n"
     )
+
+
+def _module(name: str) -> str:
+    """One ES module as a function of its own scope: imports become constants, exports the object that it returns."""
+    source = (_HERE / f"{name}.js").read_text(encoding="utf-8")
+    source = re.sub(r'^import (\{[^}]*\}) from "\./(\w+)\.js";$', r"const \1 = module_\2;", source, flags=re.MULTILINE)
+    exports = re.findall(r"^export (?:function|class|const) (\w+)", source, flags=re.MULTILINE)
+    source = re.sub(r"^export (?=function|class|const)", "", source, flags=re.MULTILINE)
+    return f"const module_{name} = (() => {{\n{source}return {{ {', '.join(exports)} }};\n}})();\n"
 
 
 def stage_page(payload: Json, title: str = "Motion stage", height: int = 320, autoplay: bool = True) -> str:

@@ -2,123 +2,135 @@
 
 import { css, mix, readable, systemColour } from "./colour.js";
 import { project } from "./camera.js";
+import { el } from "./dom.js";
 import { findContacts, paintContacts, paintGrid, paintShadow, paintTrail } from "./floor.js";
 import { guidedJoints } from "./guidance.js";
-import { createPainter, tonesOf } from "./paint.js";
+import { Painter, tonesOf } from "./paint.js";
 import { createBody } from "./skeleton.js";
 
+const WORDS = 44; // pixels under the figures that belong to their names
+const AIR = 10; // pixels above them
 const SMOOTH = 10; // frames on either side over which the followed point is averaged
+const REACHING = ["pelvis", "head", "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_knee", "r_knee", "l_foot", "r_foot"];
 
-export function createFigures(canvas, labels, store, camera) {
-  const ctx = canvas.getContext("2d");
-  let data = null, figures = [], body = null, painter = null, theme = null, ratio = 1, spacing = 1.2;
-  const pose = new Float64Array(66);
-  let spheres = null, screen = null;
-
-  function setData(next) {
-    data = next;
-    body = createBody(data.skeleton);
-    painter = createPainter(body);
-    spheres = new Float64Array(body.size * 3);
-    screen = new Float64Array(body.size * 3);
-    figures = data.figures.map((block) => ({ block, frames: block.frames, joints: block.joints }));
-    for (const figure of figures) {
-      if (figure.block.g === "live") figure.joints = guidedJoints(data.features, store.state.guidance);
-      else if (figure.block.g !== null && !figure.joints) figure.joints = guidedJoints(data.features, figure.block.g);
-      measure(figure);
-    }
-    spacing = laneSpacing();
-    writeLabels();
-    dress();
+export class Figures {
+  constructor(canvas, labels, store, camera) {
+    Object.assign(this, { canvas, labels, store, camera, data: null, figures: [], theme: null, ratio: 1, spacing: 1.2 });
+    this.ctx = canvas.getContext("2d", { alpha: false });
   }
 
-  function measure(figure) {
+  setData(data) {
     const names = data.skeleton.names;
-    figure.contacts = findContacts(figure.joints, figure.frames, names, data.fps);
-    figure.centre = smoothRoot(figure.joints, figure.frames, 3 * names.length);
+    this.data = data;
+    this.width = 3 * names.length; // numbers in a pose
+    this.body = createBody(data.skeleton);
+    this.painter = new Painter(this.body);
+    this.pose = new Float64Array(this.width);
+    this.spheres = new Float64Array(this.body.size * 3);
+    this.screen = new Float64Array(this.body.size * 3);
+    this.reaching = REACHING.map((name) => 3 * names.indexOf(name));
+    this.head = 3 * names.indexOf("head");
+    this.figures = data.figures.map((block) => ({ block, frames: block.frames, joints: block.joints }));
+    for (const figure of this.figures) {
+      const g = figure.block.g === "live" ? this.store.state.guidance : figure.block.g;
+      if (g !== null && data.features) figure.joints = guidedJoints(data.features, g);
+      this.measure(figure);
+    }
+    this.writeLabels();
+    this.dress();
   }
 
-  function setGuidance(g) {
-    for (const figure of figures) {
+  setGuidance(g) {
+    for (const figure of this.figures) {
       if (figure.block.g !== "live") continue;
-      figure.joints = guidedJoints(data.features, g, figure.joints);
-      measure(figure);
+      figure.joints = guidedJoints(this.data.features, g, figure.joints);
+      this.measure(figure);
     }
   }
 
-  function dress(nextTheme = theme) {
-    theme = nextTheme;
+  measure(figure) {
+    const { names } = this.data.skeleton;
+    figure.contacts = findContacts(figure.joints, figure.frames, names, this.data.fps);
+    figure.centre = smoothRoot(figure.joints, figure.frames, this.width);
+  }
+
+  dress(theme = this.theme) {
+    this.theme = theme;
     if (!theme) return;
-    for (const figure of figures) {
+    for (const figure of this.figures) {
       figure.rgb = systemColour(figure.block, theme);
       figure.tones = tonesOf(figure.rgb, theme);
-      if (figure.label) figure.label.style.setProperty("--system", css(readable(figure.rgb, theme.surface, theme.text)));
+      figure.label.style.setProperty("--system", css(readable(figure.rgb, theme.surface, theme.text)));
     }
   }
 
-  function writeLabels() {
-    labels.replaceChildren(...figures.map((figure) => {
-      const label = document.createElement("div");
-      const name = document.createElement("strong"), caption = document.createElement("span");
-      name.textContent = figure.block.name;
-      caption.textContent = figure.block.caption || "";
-      label.className = "ms-label";
-      label.append(name, caption);
-      figure.label = label;
-      figure.labelAt = null;
-      return label;
-    }));
-    const told = figures.map(({ block }) => (block.caption ? `${block.name} (${block.caption})` : block.name));
-    const count = figures.length === 1 ? "One figure" : `${figures.length} figures in sync`;
-    canvas.setAttribute("aria-label", `${count}: ${told.join(", ")}. ${(data.frames / data.fps).toFixed(1)} seconds.`);
+  writeLabels() {
+    for (const figure of this.figures) {
+      const name = el("strong", { text: figure.block.name }), caption = el("span", { text: figure.block.caption || "" });
+      figure.label = el("div", { class: "ms-label" }, name, caption);
+    }
+    this.labels.replaceChildren(...this.figures.map((figure) => figure.label));
+    const told = this.figures.map(({ block }) => (block.caption ? `${block.name} (${block.caption})` : block.name));
+    const count = told.length === 1 ? "One figure" : `${told.length} figures in sync`;
+    const length = (this.data.frames / this.data.fps).toFixed(1);
+    this.canvas.setAttribute("aria-label", `${count}: ${told.join(", ")}. ${length} seconds.`);
   }
 
-  function resize(width, height, pixelRatio) {
-    ratio = pixelRatio;
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    camera.resize(width, height, 10, 44);
+  resize(width, height, ratio) {
+    this.ratio = ratio;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    this.camera.resize(width, height, AIR, WORDS);
   }
 
   // Lanes lie along the camera's right-hand direction, so figures stay side by side from every angle.
-  function laneOf(index) {
-    if (store.state.layout === "overlay") return [0, 0];
-    const metres = (index - (figures.length - 1) / 2) * spacing;
-    return [camera.right[0] * metres, camera.right[2] * metres];
+  laneOf(index) {
+    if (this.store.state.layout === "overlay") return [0, 0];
+    const metres = (index - (this.figures.length - 1) / 2) * this.spacing;
+    return [this.camera.right[0] * metres, this.camera.right[2] * metres];
   }
 
-  function laneSpacing() {
+  // Wide enough for the widest gesture, wider where the picture has room to spare.
+  laneSpacing(tall) {
     let half = 0.45;
-    for (const { joints, frames, centre } of figures) {
+    for (const { joints, frames, centre } of this.figures) {
       for (let t = 0; t < frames; t += 3) {
-        for (let j = 0; j < 66; j += 3) {
-          const at = t * 66 + j;
+        for (const j of this.reaching) {
+          const at = t * this.width + j;
           half = Math.max(half, Math.hypot(joints[at] - centre[2 * t], joints[at + 2] - centre[2 * t + 1]));
         }
       }
     }
-    return Math.min(2.2, Math.max(1.05, 1.75 * half));
+    const least = Math.min(2, Math.max(0.85, 1.3 * half));
+    const { width, height } = this.camera;
+    const room = (tall * width) / Math.max(1, height - AIR - WORDS) / this.figures.length;
+    return Math.max(least, Math.min(1.9, 0.8 * room));
   }
 
-  function followed(frame) {
-    const { centre, frames } = figures[0];
-    const last = frames - 1, at = Math.min(Math.floor(frame), last), next = Math.min(at + 1, last), share = frame - Math.floor(frame);
+  // The point that the camera follows at a frame: the first figure's way, smoothed; the origin where it follows nothing.
+  followed(frame) {
+    if (!this.store.state.follow) return [0, 0];
+    const { centre, frames } = this.figures[0];
+    const at = Math.min(Math.floor(frame), frames - 1), next = Math.min(at + 1, frames - 1), share = frame - Math.floor(frame);
     return [0, 1].map((i) => centre[2 * at + i] + (centre[2 * next + i] - centre[2 * at + i]) * share);
   }
 
-  // Looks again at how far the camera must stand. Only while all is visible and the payload, size or layout changed.
-  function fit() {
-    if (!figures.length) return;
-    camera.place();
+  // Finds how far the camera must stand. Called when the payload, the size or the layout has changed.
+  fit() {
+    if (!this.figures.length) return;
+    const { follow } = this.store.state;
+    const tall = this.figures.reduce((high, { joints }) => maxEvery(joints, this.width, this.head + 1, high), 1.6) + 0.2;
+    this.spacing = this.laneSpacing(tall);
+    this.camera.place();
     const points = [], box = [Infinity, -Infinity, Infinity, -Infinity];
-    figures.forEach(({ joints, frames, centre }, index) => {
-      const [dx, dz] = laneOf(index);
-      for (let t = 0; t < frames; t += 2) {
-        const [cx, cz] = store.state.follow ? followed(t) : [0, 0];
-        for (const j of [0, 15, 20, 21, 10, 11]) {
-          const at = t * 66 + 3 * j;
+    this.figures.forEach(({ joints, frames }, index) => {
+      const [dx, dz] = this.laneOf(index);
+      for (let t = 0; t < frames; t += 3) {
+        const [cx, cz] = this.followed(t);
+        for (const j of this.reaching) {
+          const at = t * this.width + j, head = j === this.head;
           const x = joints[at] - cx + dx, z = joints[at + 2] - cz + dz;
-          points.push([x, joints[at + 1] + (j === 15 ? 0.08 : 0), z, j === 15 ? 0.13 : 0.1]);
+          points.push([x, joints[at + 1] + (head ? 0.09 : 0), z, head ? 0.12 : 0.08]);
           box[0] = Math.min(box[0], x);
           box[1] = Math.max(box[1], x);
           box[2] = Math.min(box[2], z);
@@ -126,85 +138,91 @@ export function createFigures(canvas, labels, store, camera) {
         }
       }
     });
-    const top = points.reduce((high, point) => Math.max(high, point[1]), 1.7);
-    camera.target = store.state.follow ? [0, top * 0.5, 0] : [(box[0] + box[1]) / 2, top * 0.5, (box[2] + box[3]) / 2];
-    camera.home = [...camera.target];
-    camera.fit(points);
+    this.camera.target = follow ? [0, tall * 0.5, 0] : [(box[0] + box[1]) / 2, tall * 0.5, (box[2] + box[3]) / 2];
+    this.camera.fit(points);
   }
 
-  function poseAt(figure, frame) {
+  poseAt(figure, frame) {
     const last = figure.frames - 1, at = Math.min(Math.floor(frame), last), next = Math.min(at + 1, last);
-    const share = Math.min(frame, last) - at;
-    for (let i = 0; i < 66; i++) {
-      const value = figure.joints[at * 66 + i];
-      pose[i] = value + (figure.joints[next * 66 + i] - value) * share;
+    const share = Math.min(frame, last) - at, { width, pose } = this;
+    for (let i = 0; i < width; i++) {
+      const value = figure.joints[at * width + i];
+      pose[i] = value + (figure.joints[next * width + i] - value) * share;
     }
   }
 
-  function projectBody(dx, dz) {
-    body.place(pose, spheres);
+  projectBody(dx, dz) {
+    const { spheres, screen } = this;
+    this.body.place(this.pose, spheres);
     for (let i = 0; i < spheres.length; i += 3) {
-      project(camera, spheres[i] + dx, spheres[i + 1], spheres[i + 2] + dz, screen, i);
+      project(this.camera, spheres[i] + dx, spheres[i + 1], spheres[i + 2] + dz, screen, i);
     }
   }
 
-  function draw() {
-    if (!data || !theme || camera.width < 2) return;
-    const { frame, follow, trail } = store.state;
-    if (follow) [camera.target[0], camera.target[2]] = followed(frame);
+  draw() {
+    const { ctx, camera, theme } = this;
+    if (!this.data || !theme || camera.width < 2) return;
+    const { frame, follow } = this.store.state;
+    if (follow) [camera.target[0], camera.target[2]] = this.followed(frame);
     camera.place();
-    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.clearRect(0, 0, camera.width, camera.height);
+    ctx.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    ctx.fillStyle = css(theme.surface);
+    ctx.fillRect(0, 0, camera.width, camera.height);
     paintGrid(ctx, camera, theme);
-    const lanes = figures.map((_, index) => laneOf(index));
-    figures.forEach((figure, index) => {
-      const [dx, dz] = lanes[index];
-      if (trail) paintTrail(ctx, camera, figure.rgb, figure.joints, figure.frames, 66, frame, dx, dz);
-      paintContacts(ctx, camera, figure.rgb, figure.contacts, Math.min(frame, figure.frames - 1), data.fps, dx, dz, trail);
-      poseAt(figure, frame);
-      paintShadow(ctx, camera, theme, pose, data.skeleton.parents, dx, dz);
-    });
-    figures.forEach((figure, index) => drawFigure(figure, lanes[index], frame));
-    placeLabels(lanes, frame);
+    const lanes = this.figures.map((_, index) => this.laneOf(index));
+    this.figures.forEach((figure, index) => this.drawGround(figure, lanes[index], frame));
+    this.figures.forEach((figure, index) => this.drawFigure(figure, lanes[index], frame));
+    this.placeLabels(lanes, frame);
   }
 
-  function drawFigure(figure, [dx, dz], frame) {
-    const twin = store.state.ghost && figure.block.ghost_of && figures.find((other) => other.block.id === figure.block.ghost_of);
+  drawGround(figure, [dx, dz], frame) {
+    const { ctx, camera, theme, data } = this, { trail } = this.store.state;
+    const now = Math.min(frame, figure.frames - 1);
+    if (trail) paintTrail(ctx, camera, figure.rgb, figure.joints, figure.frames, this.width, now, dx, dz);
+    this.poseAt(figure, frame);
+    paintShadow(ctx, camera, theme, this.pose, data.skeleton.parents, dx, dz);
+    paintContacts(ctx, camera, figure.rgb, figure.contacts, now, data.fps, dx, dz, trail);
+  }
+
+  drawFigure(figure, [dx, dz], frame) {
+    const { ctx, camera, theme, screen, painter } = this, { ghost, layout } = this.store.state;
+    const twin = ghost && this.figures.find((other) => other.block.id === figure.block.ghost_of);
     if (twin) {
-      poseAt(twin, frame);
-      projectBody(dx, dz);
-      painter.paintFlat(ctx, screen, camera.focal, css(mix(theme.surface, twin.rgb, 0.3)), css(mix(theme.surface, twin.rgb, 0.62)));
+      this.poseAt(twin, frame);
+      this.projectBody(dx, dz);
+      const [fill, line] = [0.3, 0.62].map((share) => css(mix(theme.surface, twin.rgb, share)));
+      painter.paintFlat(ctx, screen, camera.focal, fill, line);
     }
-    poseAt(figure, frame);
-    projectBody(dx, dz);
-    const over = frame > figure.frames ? 0.45 : store.state.layout === "overlay" && figures.length > 1 ? 0.82 : 1;
-    painter.paint(ctx, screen, camera.focal, figure.tones, over);
+    this.poseAt(figure, frame);
+    this.projectBody(dx, dz);
+    const over = frame >= figure.frames + 0.5; // a shorter motion has ended and waits
+    painter.paint(ctx, screen, camera.focal, figure.tones, over ? 0.45 : layout === "overlay" && this.figures.length > 1 ? 0.82 : 1);
   }
 
-  function placeLabels(lanes, frame) {
-    const point = [0, 0, 0], room = camera.width / figures.length;
+  placeLabels(lanes, frame) {
+    const { camera, figures } = this, point = [0, 0, 0], room = camera.width / figures.length;
+    const { follow, layout } = this.store.state;
     figures.forEach((figure, index) => {
       let x = (index + 0.5) * room;
-      if (store.state.layout !== "overlay") {
+      if (layout !== "overlay") {
         const t = Math.min(Math.floor(frame), figure.frames - 1);
-        const [cx, cz] = store.state.follow ? [camera.target[0], camera.target[2]] : [figure.centre[2 * t], figure.centre[2 * t + 1]];
+        const [cx, cz] = follow ? [camera.target[0], camera.target[2]] : [figure.centre[2 * t], figure.centre[2 * t + 1]];
         project(camera, cx + lanes[index][0], 0.9, cz + lanes[index][1], point, 0);
         x = point[0];
       }
       x = Math.round(Math.min(Math.max(x, 40), camera.width - 40));
-      if (figure.labelAt === x) return;
-      figure.labelAt = x;
+      if (figure.labelAt === x && figure.labelRoom === room) return;
+      Object.assign(figure, { labelAt: x, labelRoom: room });
       figure.label.style.transform = `translateX(${x}px) translateX(-50%)`;
       figure.label.style.maxWidth = `${Math.max(room - 8, 56)}px`;
     });
   }
+}
 
-  return {
-    setData, setGuidance, dress, resize, fit, draw,
-    get figures() {
-      return figures;
-    },
-  };
+function maxEvery(array, step, from, least) {
+  let most = least;
+  for (let i = from; i < array.length; i += step) most = Math.max(most, array[i]);
+  return most;
 }
 
 // Root x, z averaged over neighbouring frames: what the camera follows without shaking at every step.

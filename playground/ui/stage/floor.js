@@ -67,9 +67,11 @@ export function paintShadow(ctx, camera, theme, pose, parents, dx, dz) {
       }
     }
     ctx.lineCap = ctx.lineJoin = "round";
-    ctx.strokeStyle = theme.dark ? "rgba(0,0,0,0.34)" : "rgba(30,34,44,0.13)";
-    ctx.lineWidth = 0.13;
-    ctx.stroke();
+    ctx.strokeStyle = theme.dark ? "rgba(0,0,0,0.2)" : "rgba(30,34,44,0.07)";
+    for (const wide of [0.21, 0.12]) {
+      ctx.lineWidth = wide; // a wide faint stroke under a narrow one: a soft edge
+      ctx.stroke();
+    }
   });
 }
 
@@ -104,11 +106,11 @@ export function paintContacts(ctx, camera, rgb, contacts, frame, fps, dx, dz, al
     if (mark.start > frame) continue;
     const age = Math.max(0, frame - mark.stop) / fps;
     if (age > 0 && !all) continue;
-    const alpha = age > 0 ? Math.max(0.12, 0.4 - 0.14 * age) : 0.55;
+    const alpha = age > 0 ? Math.max(0.12, 0.36 - 0.12 * age) : 0.5;
     onFloor(ctx, camera, mark.x + dx, mark.z + dz, () => {
       ctx.rotate(mark.angle);
       ctx.beginPath();
-      ctx.ellipse(0, 0, 0.16, 0.065, 0, 0, 2 * Math.PI);
+      ctx.roundRect(-0.15, -0.06, 0.3, 0.12, 0.06);
       ctx.fillStyle = css(rgb, alpha);
       ctx.fill();
     });

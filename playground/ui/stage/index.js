@@ -4,14 +4,14 @@ import { createCamera } from "./camera.js";
 import { readTheme } from "./colour.js";
 import { decodePayload } from "./decode.js";
 import { el } from "./dom.js";
-import { createFigures } from "./figures.js";
+import { Figures } from "./figures.js";
 import { addGestures } from "./gestures.js";
 import { listenToKeys } from "./keys.js";
 import { describeCell } from "./rows.js";
-import { createScore, GUTTER, MARGIN } from "./score.js";
+import { GUTTER, MARGIN, Score } from "./score.js";
 import { COMMITS, createStore } from "./store.js";
-import { createTimeline } from "./timeline.js";
-import { createToolbar } from "./toolbar.js";
+import { Timeline } from "./timeline.js";
+import { Toolbar } from "./toolbar.js";
 
 const mounted = new Map(); // name -> api
 const slots = new Map(); // name -> element that shows the score of that stage
@@ -45,7 +45,7 @@ class Stage {
     this.store = createStore();
     this.camera = createCamera();
     this.data = null;
-    this.dirty = { layout: true, theme: true, still: true, moving: true };
+    this.dirty = { layout: true, theme: true, still: true, cells: true, figures: true };
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.build(element);
     this.listen();
@@ -60,17 +60,17 @@ class Stage {
     this.spoken = el("div", { class: "ms-spoken", "aria-live": "polite" });
     this.picture = el("div", { class: "ms-picture" }, canvas, labels, this.badge, this.notice, el("div", { class: "ms-progress" }));
     this.picture.style.height = typeof this.options.height === "number" ? `${this.options.height}px` : this.options.height;
-    this.figures = createFigures(canvas, labels, this.store, this.camera);
-    this.toolbar = createToolbar(this.store, { onReset: () => this.resetView() });
-    this.timeline = createTimeline(this.store, () => this.data);
-    this.score = createScore(this.store, { onView: (view) => this.timeline.setView(view) || this.redraw("moving") });
+    this.figures = new Figures(canvas, labels, this.store, this.camera);
+    this.toolbar = new Toolbar(this.store, { onReset: () => this.resetView() });
+    this.timeline = new Timeline(this.store, () => this.data);
+    this.score = new Score(this.store, { onView: (view) => this.setView(view) });
     this.scorePart = el("div", { class: "ms-score ms" }, this.timeline.element, this.score.element);
     this.element = el(
       "section", { class: "ms is-empty", tabindex: "0", "aria-label": "Stage: figures and tokens. Space plays, arrows step." },
       this.picture, this.toolbar.element, this.error, this.scorePart, this.spoken,
     );
     host.replaceChildren(this.element);
-    addGestures(canvas, this.camera, { onMove: () => this.redraw("moving"), onReset: () => this.resetView() });
+    addGestures(canvas, this.camera, { onMove: () => this.redraw("figures"), onReset: () => this.resetView() });
   }
 
   listen() {
@@ -81,7 +81,7 @@ class Stage {
       listenToKeys({
         element: this.element, store, camera: this.camera,
         owns: (node) => this.element.contains(node) || this.scorePart.contains(node),
-        getData: () => this.data, locate: this.score.locate, onCamera: () => this.redraw("moving"),
+        getData: () => this.data, locate: (selection) => this.score.locate(selection), onCamera: () => this.redraw("figures"),
       }),
     ];
     this.watchSize = new ResizeObserver(() => this.redraw("layout"));
@@ -125,7 +125,7 @@ class Stage {
     this.showBadge(data.badge);
     this.element.classList.toggle("has-tracks", data.tracks.length > 0);
     this.shape = shape;
-    this.redraw("layout", "theme", "still", "moving");
+    this.redraw("layout", "theme");
     if (first && (this.options.autoplay ?? true) && !this.calm.matches) this.store.set({ playing: true });
   }
 
@@ -150,12 +150,14 @@ class Stage {
   }
 
   changed(changed) {
-    const layout = ["layout", "follow"].some((key) => changed.has(key));
-    if (changed.has("guidance") && this.data) this.figures.setGuidance(this.store.state.guidance);
-    if (changed.has("scale") || changed.has("scaleMode")) this.redraw("still");
-    if (changed.has("selection")) this.speak();
+    const has = (...keys) => keys.some((key) => changed.has(key));
+    if (has("guidance") && this.data) this.figures.setGuidance(this.store.state.guidance);
+    if (has("selection")) this.speak();
+    if (has("layout", "follow")) this.redraw("layout");
+    if (has("scale", "scaleMode")) this.redraw("still");
+    if (has("hover", "span", "selection")) this.redraw("cells");
+    if (has("frame", "playing", "guidance", "trail", "ghost")) this.redraw("figures");
     this.toolbar.show(changed);
-    this.redraw(layout ? "layout" : "moving");
   }
 
   speak() {
@@ -166,7 +168,6 @@ class Stage {
 
   redraw(...what) {
     for (const part of what) this.dirty[part] = true;
-    this.dirty.moving = true;
     this.pending ??= requestAnimationFrame((now) => this.tick(now));
   }
 
@@ -180,16 +181,22 @@ class Stage {
     if (dirty.theme) this.dress();
     if (dirty.layout) this.layOut();
     if (dirty.still) this.score.drawStill();
-    if (dirty.moving) this.drawMoving();
+    if (dirty.cells) this.drawCells();
+    if (dirty.figures) this.drawFigures();
     Object.keys(dirty).forEach((part) => (dirty[part] = false));
-    if (store.state.playing) this.redraw();
+    if (store.state.playing) this.redraw("figures");
   }
 
-  drawMoving() {
-    this.figures.draw();
+  drawCells() {
+    this.score.drawCells();
     this.timeline.draw();
-    this.timeline.tell();
-    this.score.drawMoving();
+  }
+
+  drawFigures() {
+    this.figures.draw();
+    this.timeline.move();
+    this.score.move();
+    this.toolbar.showReset(!this.camera.isHome());
     if (this.store.state.playing) this.score.reveal();
     for (const listener of this.frameListeners || []) listener(this.store.state.frame);
   }
@@ -197,9 +204,9 @@ class Stage {
   dress() {
     const theme = readTheme(this.element);
     this.figures.dress(theme);
-    this.timeline.dress(theme);
+    this.timeline.theme = theme;
     this.score.dress(theme);
-    this.dirty.still = true;
+    Object.assign(this.dirty, { still: true, cells: true, figures: true });
   }
 
   layOut() {
@@ -209,12 +216,17 @@ class Stage {
     this.timeline.resize(wide, tracks ? GUTTER : 10, MARGIN, ratio);
     this.figures.resize(this.picture.clientWidth, this.picture.clientHeight, ratio);
     if (this.data) this.figures.fit();
-    this.dirty.still = true;
+    Object.assign(this.dirty, { still: true, cells: true, figures: true });
   }
 
   resetView() {
     this.camera.reset();
     this.redraw("layout");
+  }
+
+  setView(view) {
+    this.timeline.view = view;
+    this.redraw("cells");
   }
 
   moveScore(element) {
@@ -265,7 +277,7 @@ class Stage {
   }
 
   setSpanMode(on) {
-    this.timeline.setSpanMode(Boolean(on));
+    this.timeline.spanMode = Boolean(on);
   }
 
   // event: "select", "span", "scale" (on commit), "change" (any value of the state), "frame" (each drawn frame).

@@ -2,8 +2,8 @@
 
 import { shareOf } from "./store.js";
 
-export const HEADER = 26;
-const GAP = 10;
+const HEADER = 26; // pixels over a track, for its name
+const GAP = 10; // pixels under it
 
 // rows: [{track, level, y, height}], heads: [{track, y}], height of all. Rows get lower where there are many tracks.
 export function layRows(tracks) {
@@ -58,12 +58,4 @@ export function describeCell(tracks, { track: index, level, position }, fps) {
     lines.push([`entropy ${row.entropy[position].toPrecision(2)} nats`, `${Math.round(100 * share)} % of the most it could be`]);
   }
   return lines;
-}
-
-// Fills one cell; wide ones have soft corners.
-export function fillCell(ctx, [x, y, w, h]) {
-  if (w < 8) return ctx.fillRect(x, y, w, h);
-  ctx.beginPath();
-  ctx.roundRect(x, y, w, h, 2);
-  ctx.fill();
 }

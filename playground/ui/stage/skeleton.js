@@ -1,4 +1,4 @@
-// Flesh on the bones: a body of spheres round the joints, and the parts whose outlines are hulls of those spheres.
+// Flesh on the bones: a body of spheres round the joints, and the parts that are hulls of those spheres.
 // Joint names and parents come with the payload (playground/motion/skeleton.py); only the drawing's own radii live here.
 
 // name: [kind, ..., radius in metres].
@@ -16,13 +16,16 @@ const MIDDLE = {
   yokeL: ["between", "l_shoulder", "l_collar", 0.3, 0.056],
   yokeR: ["between", "r_shoulder", "r_collar", 0.3, 0.056],
   nape: ["off", "neck", "chest", [0, 0.0, 0.0], 0.062],
-  throat: ["off", "neck", "chest", [0, 0.01, 0.012], 0.052],
-  skullBase: ["off", "head", "head", [0, 0.01, -0.012], 0.05],
-  jaw: ["off", "head", "head", [0, 0.0, 0.04], 0.05],
-  brow: ["off", "head", "head", [0, 0.092, 0.028], 0.077],
-  crown: ["off", "head", "head", [0, 0.105, -0.012], 0.084],
-  nose: ["off", "head", "head", [0, 0.052, 0.1], 0.013],
-  bridge: ["off", "head", "head", [0, 0.082, 0.096], 0.008],
+  throat: ["off", "neck", "chest", [0, 0.02, 0.01], 0.05],
+  skullBase: ["off", "head", "head", [0, 0.015, -0.012], 0.05],
+  jaw: ["off", "head", "head", [0, -0.002, 0.042], 0.05],
+  brow: ["off", "head", "head", [0, 0.09, 0.026], 0.077],
+  crown: ["off", "head", "head", [0, 0.102, -0.018], 0.085],
+  bridge: ["off", "head", "head", [0, 0.078, 0.098], 0.006],
+  nose: ["off", "head", "head", [0, 0.042, 0.106], 0.012],
+  eyeL: ["off", "head", "head", [0.042, 0.082, 0.068], 0.021],
+  eyeR: ["off", "head", "head", [-0.042, 0.082, 0.068], 0.021],
+  eyes: ["off", "head", "head", [0, 0.08, 0.083], 0.022],
 };
 
 function limbSpheres(side) {
@@ -46,44 +49,56 @@ function limbSpheres(side) {
   };
 }
 
-// [tone, spheres, spheres whose rim is not drawn because the next part continues there]
-function limbParts(side) {
-  const named = (...names) => names.map((name) => name + side);
+// parts: [spheres, spheres whose rim is not drawn because the next shape goes on there]
+function limbShapes(side) {
+  const shape = (spheres, open) => {
+    const named = (names) => names.map((name) => name + side);
+    return { tone: side, behind: 0, parts: [[named(spheres), named(open)]] };
+  };
   return [
-    [side, named("groin", "thigh", "knee"), named("groin", "knee")],
-    [side, named("knee", "calf", "ankle"), named("knee", "ankle")],
-    [side, named("ankle", "heel", "ball", "toe"), named("ankle")],
-    [side, named("shoulder", "biceps", "elbow"), named("shoulder", "elbow")],
-    [side, named("elbow", "forearm", "wrist"), named("elbow", "wrist")],
-    [side, named("wrist", "palm", "fingers"), named("wrist")],
+    shape(["groin", "thigh", "knee"], ["groin", "knee"]),
+    shape(["knee", "calf", "ankle"], ["knee", "ankle"]),
+    shape(["ankle", "heel", "ball", "toe"], ["ankle"]),
+    shape(["shoulder", "biceps", "elbow"], ["shoulder", "elbow"]),
+    shape(["elbow", "forearm", "wrist"], ["elbow", "wrist"]),
+    shape(["wrist", "palm", "fingers"], ["wrist"]),
   ];
 }
 
-const PARTS = [
-  ["M", ["waist", "belly", "seat", "hipL", "hipR"], ["waist", "belly", "seat", "hipL", "hipR"]],
-  ["M", ["waist", "ribs", "belly"], ["waist", "ribs", "belly"]],
-  ["M", ["ribs", "chest", "breastL", "breastR", "yokeL", "yokeR", "nape"], ["ribs", "chest", "nape", "yokeL", "yokeR"]],
-  ["M", ["throat", "skullBase"], ["throat", "skullBase"]],
-  ["H", ["skullBase", "jaw", "brow", "crown"], []],
-  ["H", ["nose", "bridge"], []],
-  ...limbParts("L"), ...limbParts("R"),
+// Parts that are painted together, as one shape; `behind` moves a shape back in metres, so that its neighbour covers the seam.
+const SHAPES = [
+  {
+    tone: "M",
+    behind: 0,
+    parts: [
+      [["waist", "belly", "seat", "hipL", "hipR"], []],
+      [["waist", "ribs", "belly"], []],
+      [["ribs", "chest", "breastL", "breastR", "yokeL", "yokeR", "nape"], []],
+    ],
+  },
+  { tone: "M", behind: 0.16, parts: [[["throat", "skullBase"], ["throat", "skullBase"]]] },
+  { tone: "H", behind: 0, parts: [[["skullBase", "jaw", "brow", "crown"], []]] },
+  { tone: "H", behind: 0.2, parts: [[["bridge", "nose"], ["bridge", "nose"]]] }, // shows in the profile only
+  { tone: "V", behind: 0, parts: [[["eyeL", "eyes", "eyeR"], ["eyeL", "eyes", "eyeR"]]] }, // a visor: where the face looks
+  ...limbShapes("L"), ...limbShapes("R"),
 ];
 
-// spheres: radii and a function that places them; parts: indices of spheres.
+// The body of a skeleton: radii of its spheres, the shapes they make, and a function that places them on a pose.
 export function createBody(skeleton) {
   const joint = Object.fromEntries(skeleton.names.map((name, index) => [name, index]));
   const table = { ...MIDDLE, ...limbSpheres("L"), ...limbSpheres("R") };
   const names = Object.keys(table);
   const recipes = names.map((name) => compile(table[name], joint));
-  const parts = PARTS.map(([tone, spheres, open]) => ({
-    tone,
-    torso: tone === "M",
-    spheres: spheres.map((name) => names.indexOf(name)),
-    open: spheres.map((name) => open.includes(name)),
+  const shapes = SHAPES.map((shape) => ({
+    ...shape,
+    parts: shape.parts.map(([spheres, open]) => ({
+      spheres: spheres.map((name) => names.indexOf(name)),
+      open: spheres.map((name) => open.includes(name)),
+    })),
   }));
   const frames = { hips: new Float64Array(9), chest: new Float64Array(9), head: new Float64Array(9) };
   return {
-    parts,
+    shapes,
     radii: Float64Array.from(names, (name) => table[name].at(-1)),
     size: names.length,
     // pose: [J * 3] positions; out: [size * 3] sphere centres.

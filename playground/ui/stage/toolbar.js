@@ -3,77 +3,82 @@
 import { el, icon, seconds } from "./dom.js";
 
 const SPEEDS = [0.5, 1, 2];
+const TOGGLES = {
+  loop: ["Loop", "Start again at the end (L)"],
+  follow: ["Follow", "The camera goes with the figure (F)"],
+  trail: ["Trail", "Show the way over the floor and the footprints (T)"],
+  ghost: ["Ghost", "Show the original faintly behind each reconstruction (G)"],
+};
 
-export function createToolbar(store, { onReset }) {
-  const { state } = store;
-  const step = (by) => () => store.set({ playing: false }) || store.seek(Math.round(state.frame) + by);
-  const play = el("button", { type: "button", class: "ms-button ms-play" });
-  const back = el("button", { type: "button", class: "ms-button", "aria-label": "One frame back", title: "One frame back (←)" }, icon("back"));
-  const next = el("button", { type: "button", class: "ms-button", "aria-label": "One frame on", title: "One frame on (→)" }, icon("next"));
-  const now = el("span", { class: "ms-now" });
-  const total = el("span", { class: "ms-total" });
-  play.addEventListener("click", () => togglePlay(store));
-  back.addEventListener("click", step(-1));
-  next.addEventListener("click", step(1));
+export class Toolbar {
+  constructor(store, { onReset }) {
+    const { state } = store;
+    this.store = store;
+    const step = (by) => () => {
+      store.set({ playing: false });
+      store.seek(Math.round(state.frame) + by);
+    };
+    this.play = button("", "Play", () => togglePlay(store), "ms-play");
+    const back = button("", "One frame back (←)", step(-1)), next = button("", "One frame on (→)", step(1));
+    back.append(icon("back"));
+    next.append(icon("next"));
+    this.now = el("span", { class: "ms-now" });
+    this.total = el("span", { class: "ms-total" });
+    this.speeds = SPEEDS.map((speed) => button(`${speed}×`, `Play at ${speed} times the speed`, () => store.set({ speed })));
+    this.toggles = Object.fromEntries(Object.entries(TOGGLES).map(([key, [text, title]]) =>
+      [key, button(text, title, () => store.set({ [key]: !state[key] }))]));
+    this.overlay = button("Overlay", "Put all figures on one spot (O)", () => toggleLayout(store));
+    this.reset = button("Reset view", "Camera back to its place (R)", onReset);
+    this.element = el(
+      "div", { class: "ms-toolbar", role: "toolbar", "aria-label": "Playback" },
+      el("div", { class: "ms-group" }, back, this.play, next),
+      el("div", { class: "ms-time" }, this.now, this.total),
+      el("div", { class: "ms-group", role: "group", "aria-label": "Speed" }, ...this.speeds),
+      el("div", { class: "ms-group ms-toggles" }, ...Object.values(this.toggles), this.overlay, this.reset),
+    );
+    this.show();
+    this.showReset(false);
+    this.fitTo(null);
+  }
 
-  const speeds = SPEEDS.map((speed) => {
-    const button = el("button", { type: "button", class: "ms-button ms-text", text: `${speed}×`, title: `Play at ${speed} times the speed` });
-    button.addEventListener("click", () => store.set({ speed }));
-    return button;
-  });
-  const toggles = {
-    loop: toggle("Loop", "Start again at the end (L)"),
-    follow: toggle("Follow", "The camera goes with the figure (F)"),
-    trail: toggle("Trail", "Show the way over the floor and the footprints (T)"),
-    ghost: toggle("Ghost", "Show the original faintly behind each reconstruction (G)"),
-  };
-  for (const [key, button] of Object.entries(toggles)) button.addEventListener("click", () => store.set({ [key]: !state[key] }));
-  const overlay = toggle("Overlay", "Put all figures on one spot (O)");
-  overlay.addEventListener("click", () => toggleLayout(store));
-  const reset = el("button", { type: "button", class: "ms-button ms-text", text: "Reset view", title: "Camera back to its place (R)" });
-  reset.addEventListener("click", onReset);
-
-  const element = el(
-    "div", { class: "ms-toolbar", role: "toolbar", "aria-label": "Playback" },
-    el("div", { class: "ms-group" }, back, play, next),
-    el("div", { class: "ms-time" }, now, total),
-    el("div", { class: "ms-group ms-segment", role: "group", "aria-label": "Speed" }, ...speeds),
-    el("div", { class: "ms-group ms-toggles" }, ...Object.values(toggles), overlay, reset),
-  );
-
-  function show(changed = null) {
+  // changed: set of the state's keys that changed, or null for all.
+  show(changed = null) {
+    const { state } = this.store;
     const has = (...keys) => !changed || keys.some((key) => changed.has(key));
     if (has("playing")) {
-      play.replaceChildren(icon(state.playing ? "pause" : "play"));
-      play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
-      play.title = state.playing ? "Pause (space)" : "Play (space)";
+      this.play.replaceChildren(icon(state.playing ? "pause" : "play"));
+      this.play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
+      this.play.title = state.playing ? "Pause (space)" : "Play (space)";
     }
-    if (has("speed")) speeds.forEach((button, i) => button.setAttribute("aria-pressed", String(SPEEDS[i] === state.speed)));
-    if (has("loop", "follow", "trail", "ghost", "layout")) {
-      for (const [key, button] of Object.entries(toggles)) button.setAttribute("aria-pressed", String(state[key]));
-      overlay.setAttribute("aria-pressed", String(state.layout === "overlay"));
-    }
+    if (has("speed")) this.speeds.forEach((node, i) => press(node, SPEEDS[i] === state.speed));
+    if (has("layout")) press(this.overlay, state.layout === "overlay");
+    for (const [key, node] of Object.entries(this.toggles)) if (has(key)) press(node, state[key]);
     if (has("frame", "frames", "fps")) {
-      now.textContent = `${seconds(Math.floor(state.frame + 1e-6), state.fps)} s`;
-      total.textContent = ` / ${seconds(state.frames, state.fps)} s`;
+      this.now.textContent = seconds(Math.floor(state.frame + 1e-6), state.fps);
+      this.total.textContent = ` / ${seconds(state.frames, state.fps)} s`;
     }
+  }
+
+  showReset(on) {
+    this.reset.hidden = !on;
   }
 
   // Controls without a meaning for this payload are not there.
-  function fitTo(data) {
-    toggles.ghost.hidden = !data || !data.figures.some((figure) => figure.ghost_of);
-    overlay.hidden = !data || data.figures.length < 2;
-    element.classList.toggle("is-off", !data);
-    for (const button of element.querySelectorAll("button")) button.disabled = !data;
+  fitTo(data) {
+    this.toggles.ghost.hidden = !data || !data.figures.some((figure) => figure.ghost_of);
+    this.overlay.hidden = !data || data.figures.length < 2;
+    for (const node of this.element.querySelectorAll("button")) node.disabled = !data;
   }
-
-  show();
-  fitTo(null);
-  return { element, show, fitTo };
 }
 
-function toggle(text, title) {
-  return el("button", { type: "button", class: "ms-button ms-text", text, title, "aria-pressed": "false" });
+function button(text, title, onClick, extra = "") {
+  const node = el("button", { type: "button", class: `ms-button ${extra}`, text, title, "aria-label": text ? null : title });
+  node.addEventListener("click", onClick);
+  return node;
+}
+
+function press(node, on) {
+  node.setAttribute("aria-pressed", String(Boolean(on)));
 }
 
 export function togglePlay(store) {
