@@ -44,7 +44,7 @@ def chain_rotations(joints: Array, root: Array) -> Array:
     local = np.zeros((len(joints), HUMAN22.size, 4))
     local[:, 0] = root
     for chain in CHAINS:
-        above = np.asarray(root, np.float64)
+        above: Array = np.asarray(root, np.float64)
         for parent, joint in zip(chain, chain[1:], strict=False):
             turned = qbetween(DIRECTIONS[joint], joints[:, joint] - joints[:, parent])
             local[:, joint] = qmul(qinv(above), turned)
@@ -80,7 +80,7 @@ def from_rotations263(features: Array, lengths: Array = HUMAN22.bone_lengths) ->
     bones = unit(DIRECTIONS) * np.asarray(lengths, np.float64)[:, None]
     joints = np.repeat(positions[:, :1].astype(np.float64), HUMAN22.size, axis=1)
     for chain in CHAINS:
-        turned = root
+        turned: Array = root
         for parent, joint in zip(chain, chain[1:], strict=False):
             turned = turned @ local[:, joint - 1]
             joints[:, joint] = joints[:, parent] + turned @ bones[joint]

@@ -19,7 +19,8 @@ PARENTS = HUMAN22.parents
 OFFSETS: Array = np.asarray(HUMAN22.offsets, np.float64)
 CHILDREN = tuple(tuple(c for c, p in enumerate(PARENTS) if p == j) for j in range(HUMAN22.size))
 LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))  # hip, knee, ankle, foot of the left and the right leg
-RIGID_TOLERANCE = 1e-3  # metres; smaller changes of a motion are not worth a word
+FOOT_TOLERANCE = 1e-3  # metres that an ankle may move before a knee is bent for it
+CHANGE_WORTH_SAYING = 2e-3  # metres; smaller changes of a motion are not worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,12 @@ class RigidMotion:
     joints: Array  # [F, 22, 3] metres
     offsets: Array  # [22, 3] T-pose offset from the parent, metres
     moved: float  # farthest that a joint was moved to get there, metres
+
+    def changes(self) -> list[str]:
+        """What a person should know: nothing, or one sentence."""
+        if self.moved <= CHANGE_WORTH_SAYING:
+            return []
+        return [f"bones were set to their median lengths, which moved joints by up to {1e3 * self.moved:.0f} mm"]
 
 
 def unit(v: Array) -> Array:
@@ -107,7 +114,7 @@ def knee_poles(pelvis: Array, hips: Array, knees: Array, ankles: Array) -> Array
 def _hold_feet(placed: Array, joints: Array, lengths: Array) -> None:
     """Bend the legs of placed [F, 22, 3] in place until the ankles are back where joints [F, 22, 3] have them.
 
-    What is nearer than `RIGID_TOLERANCE` stays: a straight knee would jump by far more than the ankle gains.
+    What is nearer than `FOOT_TOLERANCE` stays: a straight knee would jump by far more than the ankle gains.
     """
     kids = list(CHILDREN[0])
     pelvis = fit_rotation(OFFSETS[kids], joints[:, kids] - joints[:, :1])
@@ -115,7 +122,7 @@ def _hold_feet(placed: Array, joints: Array, lengths: Array) -> None:
         pole = knee_poles(pelvis, placed[:, hip], placed[:, knee], placed[:, ankle])
         missed = joints[:, ankle] - placed[:, ankle]
         distance = np.linalg.norm(missed, axis=-1, keepdims=True)
-        share = np.maximum(0.0, 1.0 - RIGID_TOLERANCE / np.maximum(distance, 1e-12))
+        share = np.maximum(0.0, 1.0 - FOOT_TOLERANCE / np.maximum(distance, 1e-12))
         toe = placed[:, foot] - placed[:, ankle]
         reach = (float(lengths[knee]), float(lengths[ankle]))
         bent = two_bone_ik(placed[:, hip], placed[:, ankle] + share * missed, reach, pole)
