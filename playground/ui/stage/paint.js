@@ -2,7 +2,7 @@
 
 import { css, mix } from "./colour.js";
 
-const TURN = 30; // directions in which a hull is sampled
+const TURN = 24; // directions in which a hull is sampled
 const COS = Float64Array.from({ length: TURN }, (_, k) => Math.cos((2 * Math.PI * k) / TURN));
 const SIN = Float64Array.from({ length: TURN }, (_, k) => Math.sin((2 * Math.PI * k) / TURN));
 const WHITE = [255, 255, 255], BLACK = [10, 12, 16];
@@ -59,7 +59,8 @@ export class Painter {
   paint(ctx, screen, focal, tones, alpha = 1) {
     this.measure(screen, focal);
     ctx.globalAlpha = alpha;
-    ctx.lineJoin = ctx.lineCap = "round";
+    ctx.lineJoin = "bevel"; // hulls turn so little at each corner that it does not show
+    ctx.lineCap = "butt";
     this.silhouette(ctx, tones.outline);
     ctx.strokeStyle = tones.inner;
     ctx.lineWidth = 1.5;
@@ -77,7 +78,7 @@ export class Painter {
 
   paintFlat(ctx, screen, focal, fill, line) {
     this.measure(screen, focal);
-    ctx.lineJoin = "round";
+    ctx.lineJoin = "bevel";
     this.silhouette(ctx, line);
     ctx.fillStyle = fill;
     ctx.fill();
@@ -101,11 +102,16 @@ function trace(ctx, points) {
 
 // The rim of a part, except where the next shape of the limb goes on.
 function traceRim(ctx, { points, owner, open }) {
+  let down = false; // whether the pen is on the paper
   for (let k = 0; k < TURN; k++) {
     const next = (k + 1) % TURN;
-    if (open[owner[k]] && owner[k] === owner[next]) continue;
-    ctx.moveTo(points[2 * k], points[2 * k + 1]);
+    if (open[owner[k]] && owner[k] === owner[next]) {
+      down = false;
+      continue;
+    }
+    if (!down) ctx.moveTo(points[2 * k], points[2 * k + 1]);
     ctx.lineTo(points[2 * next], points[2 * next + 1]);
+    down = true;
   }
 }
 

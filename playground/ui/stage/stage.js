@@ -1,0 +1,294 @@
+// One mounted stage: its parts, its states, what is drawn when, and what others may call.
+
+import { createCamera } from "./camera.js";
+import { readTheme } from "./colour.js";
+import { decodePayload } from "./decode.js";
+import { el } from "./dom.js";
+import { Figures } from "./figures.js";
+import { addGestures } from "./gestures.js";
+import { listenToKeys } from "./keys.js";
+import { describeCell } from "./rows.js";
+import { GUTTER, MARGIN, Score } from "./score.js";
+import { COMMITS, createStore } from "./store.js";
+import { Timeline } from "./timeline.js";
+import { Toolbar } from "./toolbar.js";
+
+const SLOW = 0.036; // seconds a frame: where drawing takes longer, the figures get one pixel a CSS pixel
+
+export class Stage {
+  constructor(element, options) {
+    this.options = { height: 320, empty: "Choose a motion or type a prompt. The figure and its tokens appear here.", ...options };
+    this.store = createStore();
+    this.camera = createCamera();
+    this.data = null;
+    this.dirty = { layout: true, theme: true, still: true, cells: true, figures: true };
+    this.calm = matchMedia("(prefers-reduced-motion: reduce)");
+    this.build(element);
+    this.listen();
+  }
+
+  build(host) {
+    const canvas = el("canvas", { class: "ms-canvas", role: "img", "aria-label": "No motion yet" });
+    const labels = el("div", { class: "ms-labels" });
+    this.badge = el("div", { class: "ms-badge", hidden: true });
+    this.notice = el("div", { class: "ms-notice", role: "status", text: this.options.empty });
+    this.error = el("div", { class: "ms-error", role: "alert", hidden: true });
+    this.spoken = el("div", { class: "ms-spoken", "aria-live": "polite" });
+    this.picture = el("div", { class: "ms-picture" }, canvas, labels, this.badge, this.notice, el("div", { class: "ms-progress" }));
+    this.picture.style.height = typeof this.options.height === "number" ? `${this.options.height}px` : this.options.height;
+    this.figures = new Figures(canvas, labels, this.store, this.camera);
+    this.toolbar = new Toolbar(this.store, { onReset: () => this.resetView() });
+    this.timeline = new Timeline(this.store, () => this.data);
+    this.score = new Score(this.store, { onView: (view) => this.setView(view) });
+    this.scorePart = el("div", { class: "ms-score ms" }, this.timeline.element, this.score.element);
+    this.element = el(
+      "section", { class: "ms is-empty", tabindex: "0", "aria-label": "Stage: figures and tokens. Space plays, arrows step." },
+      this.picture, this.toolbar.element, this.error, this.scorePart, this.spoken,
+    );
+    host.replaceChildren(this.element);
+    addGestures(canvas, this.camera, { onMove: () => this.redraw("figures"), onReset: () => this.resetView() });
+  }
+
+  listen() {
+    const { store } = this;
+    this.forget = [
+      store.on("change", (changed) => this.changed(changed)),
+      ...COMMITS.map((event) => store.on(event, (detail) => this.options.onEvent?.(event, detail))),
+      listenToKeys({
+        element: this.element, store, camera: this.camera,
+        owns: (node) => this.element.contains(node) || this.scorePart.contains(node),
+        getData: () => this.data, locate: (selection) => this.score.locate(selection), onCamera: () => this.redraw("figures"),
+      }),
+    ];
+    this.watchSize = new ResizeObserver(() => this.redraw("layout"));
+    for (const part of [this.picture, this.scorePart]) this.watchSize.observe(part);
+    this.watchTheme = new MutationObserver(() => this.redraw("theme"));
+    for (const node of [document.documentElement, document.body]) {
+      this.watchTheme.observe(node, { attributes: true, attributeFilter: ["class", "data-theme"] });
+    }
+    this.onScreen = () => this.redraw("theme", "layout");
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", this.onScreen);
+    window.addEventListener("resize", this.onScreen); // also fires when the pixel ratio changes
+  }
+
+  // payload: object, JSON text, or null for the empty state. A message payload keeps the last result.
+  setPayload(payload) {
+    try {
+      const parsed = typeof payload === "string" && payload ? JSON.parse(payload) : payload;
+      if (parsed && parsed.state) return this.say(parsed.state, parsed.message);
+      this.data = parsed ? decodePayload(parsed) : null;
+    } catch (error) {
+      return this.say("error", error instanceof SyntaxError ? "This result cannot be shown: it is not readable." : error.message);
+    }
+    this.say(this.data ? "ready" : "empty", this.options.empty);
+    if (this.data) this.show(this.data);
+  }
+
+  show(data) {
+    const first = !this.shape, shape = data.figures.map((figure) => figure.id).join();
+    const { state } = this.store;
+    const patch = { frames: data.frames, fps: data.fps, frame: Math.min(state.frame, data.frames - 1), hover: null };
+    if (data.features && this.guidanceOf !== data.features.figure) {
+      this.guidanceOf = data.features.figure;
+      patch.guidance = data.features.guidance;
+    }
+    if (state.span && state.span[1] > data.frames) patch.span = null;
+    this.store.set(patch);
+    this.figures.setData(data);
+    this.score.setData(data);
+    this.toolbar.fitTo(data);
+    this.toolbar.show();
+    this.showBadge(data.badge);
+    this.element.classList.toggle("has-tracks", data.tracks.length > 0);
+    this.shape = shape;
+    this.redraw("layout", "theme");
+    if (first && (this.options.autoplay ?? true) && !this.calm.matches) this.store.set({ playing: true });
+  }
+
+  showBadge(badge) {
+    this.badge.hidden = !badge;
+    if (!badge) return;
+    const time = badge.seconds === null || badge.seconds === undefined ? "" : `, ${badge.seconds.toPrecision(2)} s`;
+    this.badge.textContent = `${badge.kind}${time}`;
+    this.badge.dataset.kind = badge.kind;
+    this.badge.title = badge.text || (badge.kind === "live" ? "Computed just now" : "A stored result");
+  }
+
+  // "loading" and "error" keep the last result; "empty" and "ready" end both.
+  say(state, text = "") {
+    const was = this.element.classList;
+    was.toggle("is-loading", state === "loading");
+    was.toggle("is-empty", !this.data);
+    this.element.setAttribute("aria-busy", String(state === "loading"));
+    this.error.hidden = state !== "error";
+    this.error.textContent = state === "error" ? text : "";
+    this.notice.textContent = state === "loading" ? text || "Working" : this.data ? "" : this.options.empty;
+  }
+
+  changed(changed) {
+    const has = (...keys) => keys.some((key) => changed.has(key));
+    if (has("guidance") && this.data) this.figures.setGuidance(this.store.state.guidance);
+    if (has("selection")) this.speak();
+    if (has("layout", "follow")) this.redraw("layout");
+    if (has("scale", "scaleMode")) this.redraw("still");
+    if (has("hover", "span", "selection")) this.redraw("cells");
+    if (has("frame", "playing", "guidance", "trail", "ghost")) this.redraw("figures");
+    this.toolbar.show(changed);
+  }
+
+  speak() {
+    const cell = this.score.locate(this.store.state.selection);
+    const text = cell ? describeCell(this.data.tracks, cell, this.data.fps).flat().join(", ") : "";
+    this.spoken.textContent = text;
+  }
+
+  redraw(...what) {
+    for (const part of what) this.dirty[part] = true;
+    this.pending ??= requestAnimationFrame((now) => this.tick(now));
+  }
+
+  tick(now) {
+    this.pending = null;
+    if (!this.element.isConnected) return;
+    const { store, dirty } = this;
+    if (!this.picture.clientWidth && !this.scorePart.clientWidth) return void (this.last = null); // a hidden tab rests
+    if (store.state.playing && this.last) this.advance((now - this.last) / 1000);
+    this.last = store.state.playing ? now : null;
+    if (dirty.theme) this.dress();
+    if (dirty.layout) this.layOut();
+    if (dirty.still) this.score.drawStill();
+    if (dirty.cells) this.drawCells();
+    if (dirty.figures) this.drawFigures();
+    Object.keys(dirty).forEach((part) => (dirty[part] = false));
+    if (store.state.playing) this.redraw("figures");
+  }
+
+  advance(passed) {
+    this.store.advance(Math.min(0.1, passed));
+    this.pace = 0.92 * (this.pace ?? 0) + 0.08 * Math.min(0.1, passed);
+    if (this.pace > SLOW && !this.coarse && window.devicePixelRatio > 1) {
+      this.coarse = true;
+      this.dirty.layout = true;
+    }
+  }
+
+  drawCells() {
+    this.score.drawCells();
+    this.timeline.draw();
+  }
+
+  drawFigures() {
+    this.figures.draw();
+    this.timeline.move();
+    this.score.move();
+    this.toolbar.showReset(!this.camera.isHome());
+    if (this.store.state.playing) this.score.reveal();
+    for (const listener of this.frameListeners || []) listener(this.store.state.frame);
+  }
+
+  dress() {
+    const theme = readTheme(this.element);
+    this.figures.dress(theme);
+    this.timeline.theme = theme;
+    this.score.dress(theme);
+    Object.assign(this.dirty, { still: true, cells: true, figures: true });
+  }
+
+  layOut() {
+    const ratio = window.devicePixelRatio || 1;
+    const wide = this.scorePart.clientWidth, tracks = this.data && this.data.tracks.length > 0;
+    if (this.data) this.score.resize(wide, ratio);
+    this.timeline.resize(wide, tracks ? GUTTER : 10, MARGIN, ratio);
+    this.figures.resize(this.picture.clientWidth, this.picture.clientHeight, this.coarse ? 1 : ratio);
+    if (this.data) this.figures.fit();
+    Object.assign(this.dirty, { still: true, cells: true, figures: true });
+  }
+
+  resetView() {
+    this.camera.reset();
+    this.redraw("layout");
+  }
+
+  setView(view) {
+    this.timeline.view = view;
+    this.redraw("cells");
+  }
+
+  moveScore(element) {
+    element.replaceChildren(this.scorePart);
+    this.redraw("layout");
+  }
+
+  // The rest of what others may call.
+  update(payload) {
+    this.setPayload(payload);
+  }
+
+  busy(text = "Working") {
+    this.say("loading", text);
+  }
+
+  fail(text) {
+    this.say("error", text);
+  }
+
+  setGuidance(g) {
+    if (Number.isFinite(Number(g))) this.store.set({ guidance: Number(g) });
+  }
+
+  // mode: "focus" marks a scale, "upto" | "only" | "without" say which scales the decode shown used. null: all.
+  setScale(scale, mode = "focus") {
+    this.store.set({ scale: scale || null, scaleMode: mode });
+  }
+
+  play() {
+    this.store.set({ playing: true });
+  }
+
+  pause() {
+    this.store.set({ playing: false });
+  }
+
+  seek(frame) {
+    this.store.seek(Number(frame));
+  }
+
+  select(selection) {
+    this.store.set({ selection: selection || null });
+  }
+
+  selectSpan(span) {
+    this.store.set({ span: span || null });
+  }
+
+  setSpanMode(on) {
+    this.timeline.spanMode = Boolean(on);
+  }
+
+  // event: "select", "span", "scale" (on commit), "change" (any value of the state), "frame" (each drawn frame).
+  on(event, listener) {
+    if (event !== "frame") return this.store.on(event, listener);
+    (this.frameListeners ??= new Set()).add(listener);
+    return () => this.frameListeners.delete(listener);
+  }
+
+  get state() {
+    return { ...this.store.state };
+  }
+
+  // Joints of a figure as they are drawn now, Float32Array [F * J * 3].
+  joints(id) {
+    return this.figures.figures.find((figure) => figure.block.id === id)?.joints;
+  }
+
+  destroy() {
+    this.forget.forEach((forget) => forget());
+    this.watchSize.disconnect();
+    this.watchTheme.disconnect();
+    window.removeEventListener("resize", this.onScreen);
+    matchMedia("(prefers-color-scheme: dark)").removeEventListener("change", this.onScreen);
+    cancelAnimationFrame(this.pending);
+    this.element.remove();
+    this.scorePart.remove();
+  }
+}
