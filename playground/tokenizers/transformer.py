@@ -62,6 +62,7 @@ class TokenizerConfig:
     skips: bool = True  # Table 4a-c
     positions: Literal["rope", "learned"] = "rope"  # Table 4d
     rope_base: float = 100.0  # Table 4d
+    small_init: bool = True  # weights from a normal of std 0.02 (A3); False: torch's own, which learns faster when pre-norm
 
     @property
     def latents(self) -> int:
@@ -77,6 +78,7 @@ PRESETS: dict[str, TokenizerConfig] = {
     "lite": TokenizerConfig(
         patch=4, width=192, depth=5, heads=3, hidden=512, dropout=0.0, scales=MID_SCALES,
         codes=linear_codes(128, 384, 10), code_width=192, phi="residual", text_width=384, pre_norm=True,
+        small_init=False,
     ),
 }  # fmt: skip
 
@@ -122,7 +124,8 @@ class LGTok(nn.Module):
         if c.positions == "learned":
             total = c.text_positions + c.latents + self.frames
             self.table_in = nn.Parameter(torch.randn(total, c.width) * c.width**-0.5)
-        self.apply(_init)
+        if c.small_init:
+            self.apply(_init)
 
     # ---- positions and masks -------------------------------------------------------------------------------------
 
@@ -205,18 +208,17 @@ class LGTok(nn.Module):
         count = int(tokens.max())
         queries = (self.mask_vector + self.query_positions[:count]).to(latents.dtype).expand(batch, -1, -1)
         parts, masks, memories = [queries], [length_mask(tokens, count)], []
+        places = [torch.arange(count, device=queries.device)]
         if c.latent_mixing_out == "cross":
             memories.append(Memory(latents))
         else:
-            parts.insert(0, latents)
-            masks.insert(0, None)
+            _put_before(parts, masks, places, latents, None, c.latents)
         if text_memory is not None and c.text_mixing_out == "cross":
             memories.append(text_memory)
         elif text_memory is not None:
-            parts.insert(0, text_memory.states)
-            masks.insert(0, text_memory.mask)
+            _put_before(parts, masks, places, text_memory.states, text_memory.mask, c.text_positions)
         sequence = torch.cat(parts, dim=1)
-        positions = torch.arange(sequence.shape[1], device=sequence.device)
+        positions = torch.cat(places)
         out = self.decoder(sequence, self._rotation(positions), _join_masks(masks, parts), memories)
         motion = self.motion_out(out[:, -count:])  # (B or 2B, F / patch, patch * C)
         motion = motion.reshape(len(out), count * c.patch, c.columns)[:, :frames]
@@ -303,6 +305,15 @@ def _build_stack(c: TokenizerConfig, memories: int) -> UStack:
         feed=c.feed,
         skips=c.skips,
     )
+
+
+def _put_before(
+    parts: list[Tensor], masks: list[Tensor | None], places: list[Tensor], part: Tensor, mask: Tensor | None, room: int
+) -> None:
+    """Prepend a part to a sequence; it takes `room` positions, however long it is."""
+    places[:] = [torch.arange(part.shape[1], device=part.device), *(place + room for place in places)]
+    parts.insert(0, part)
+    masks.insert(0, mask)
 
 
 def _join_masks(masks: list[Tensor | None], parts: list[Tensor]) -> Tensor | None:

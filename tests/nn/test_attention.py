@@ -1,0 +1,77 @@
+import math
+
+import torch
+
+from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention
+from playground.nn.rope import rope_angles
+
+
+def slow_attention(query, key, value, mask, heads):
+    """Float64 loops over batch, head and query; query [B, T, D], key and value [B, S, D], mask bool [B, S]."""
+    query, key, value = query.double(), key.double(), value.double()
+    out = torch.zeros_like(query)
+    size = query.shape[-1] // heads
+    for b in range(query.shape[0]):
+        for h in range(heads):
+            part = slice(h * size, (h + 1) * size)
+            for t in range(query.shape[1]):
+                scores = [float(query[b, t, part] @ key[b, s, part]) / math.sqrt(size) for s in range(key.shape[1])]
+                top = max(x for s, x in enumerate(scores) if mask[b, s])
+                weights = [math.exp(x - top) if mask[b, s] else 0.0 for s, x in enumerate(scores)]
+                for s, weight in enumerate(weights):
+                    out[b, t, part] += weight / sum(weights) * value[b, s, part]
+    return out.float()
+
+
+def test_self_attention_equals_loops_and_ignores_masked_keys():
+    torch.manual_seed(0)
+    layer, x = SelfAttention(8, 2).eval(), torch.randn(2, 5, 8)
+    mask = torch.tensor([[True] * 5, [True, True, True, False, False]])
+    query, key, value = layer.qkv(x).chunk(3, dim=-1)
+    expected = layer.out(slow_attention(query, key, value, mask, 2))
+    torch.testing.assert_close(layer(x, mask=mask), expected, atol=1e-5, rtol=1e-5)
+    changed = x.clone()
+    changed[1, 3:] = 99.0
+    torch.testing.assert_close(layer(changed, mask=mask)[1, :3], expected[1, :3], atol=1e-5, rtol=1e-5)
+
+
+def test_cross_attention_equals_loops():
+    torch.manual_seed(1)
+    layer, x, states = CrossAttention(8, 2).eval(), torch.randn(2, 4, 8), torch.randn(2, 6, 8)
+    mask = torch.tensor([[True] * 6, [True, False, True, False, True, False]])
+    key, value = layer.key_value(states).chunk(2, dim=-1)
+    expected = layer.out(slow_attention(layer.query(x), key, value, mask, 2))
+    torch.testing.assert_close(layer(x, Memory(states, mask)), expected, atol=1e-5, rtol=1e-5)
+
+
+def test_null_rows_equal_attention_to_copies_of_the_null_vector():
+    torch.manual_seed(2)
+    layer, x, states, null = CrossAttention(8, 2).eval(), torch.randn(4, 3, 8), torch.randn(2, 5, 8), torch.randn(8)
+    out = layer(x, Memory(states, None, None, null, 2))
+    torch.testing.assert_close(out[:2], layer(x[:2], Memory(states)))
+    for copies in (1, 7):
+        full = layer(x[2:], Memory(null.expand(2, copies, 8)))
+        torch.testing.assert_close(out[2:], full, atol=1e-6, rtol=1e-5)
+
+
+def test_gate_switches_the_branch_off_a_row():
+    torch.manual_seed(3)
+    layer, x, states = CrossAttention(8, 2).eval(), torch.randn(1, 3, 8), torch.randn(1, 5, 8)
+    gate = torch.tensor([[[1.0], [0.0], [1.0]]])
+    out = layer(x, Memory(states, None, gate))
+    assert torch.equal(out[0, 1], torch.zeros(8))
+    torch.testing.assert_close(out[0, 0], layer(x, Memory(states))[0, 0])
+
+
+def test_cache_gives_what_one_pass_gives():
+    torch.manual_seed(4)
+    layer, x = SelfAttention(8, 2).eval(), torch.randn(1, 6, 8)
+    rotation = rope_angles(torch.arange(6), 4, 100.0)
+    blocks = torch.tensor([0, 0, 0, 1, 1, 1])
+    pattern = (blocks[:, None] >= blocks[None, :])[None, None]
+    cache = KeyValueCache()
+    parts = [
+        layer(x[:, part], rotation=tuple(r[part] for r in rotation), cache=cache) for part in (slice(0, 3), slice(3, 6))
+    ]
+    full = layer(x, rotation=rotation, mask=pattern)
+    torch.testing.assert_close(torch.cat(parts, dim=1), full, atol=1e-6, rtol=1e-5)
