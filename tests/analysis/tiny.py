@@ -61,7 +61,17 @@ def tiny_assets(folder: Path, library: Library) -> Path:
         tokenizer = build_tokenizer(config)
         for book in tokenizer.quantizer.codebooks:
             book.vectors.normal_()  # type: ignore[operator, union-attr]
-        draws = GeneratorConfig(width=16, depth=1, heads=2, hidden=16, scales=SCALES, codes=CODES, code_width=8)
+        draws = GeneratorConfig(
+            width=16,
+            depth=1,
+            heads=2,
+            hidden=16,
+            scales=SCALES,
+            codes=CODES,
+            code_width=8,
+            text_width=384,
+            text_mask=True,
+        )
         generator = build_generator(draws)
     place = folder / "checkpoints" / SYSTEM
     card = Card("tokenizer", config, identity, "tiny", {"step": 1}, library.normaliser)
