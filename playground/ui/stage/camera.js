@@ -24,7 +24,7 @@ export function createCamera() {
     },
     // Size of the picture in CSS pixels; top and bottom are kept free for words.
     resize: (width, height, top, bottom) => Object.assign(camera, { width, height, top, bottom }),
-    isHome: () => camera.yaw === HOME.yaw && camera.pitch === HOME.pitch && camera.zoom === 1 && !camera.pan[0] && !camera.pan[1],
+    isHome: () => ["yaw", "pitch", "zoom"].every((key) => camera[key] === HOME[key]) && !camera.pan.some(Boolean),
     place: () => place(camera),
     fit: (points) => fit(camera, points),
   });

@@ -33,7 +33,7 @@ from playground.figures.stage import Json
 _HERE = Path(__file__).parent
 _MODULES = (
     "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "figures", "rows", "score",
-    "timeline", "toolbar", "gestures", "keys", "stage", "index",
+    "timeline", "toolbar", "gestures", "keys", "notices", "stage", "index",
 )  # fmt: skip
 _ON_LOAD = """
 const options = JSON.parse(props.options);

@@ -1,4 +1,4 @@
-// Base64 of little-endian arrays -> typed arrays, and the payload of playground/figures/stage.py -> what the views draw.
+// Base64 of little-endian arrays -> typed arrays; payload of playground/figures/stage.py -> what the views draw.
 
 export function bytesOf(text) {
   const raw = atob(text);
@@ -57,6 +57,9 @@ export function decodePayload(payload) {
     const positions = figure.joints ? floatsOf(figure.joints) : null;
     if (positions && positions.length !== figure.frames * joints * 3) {
       throw new Error(`This result cannot be shown: figure "${figure.name}" does not have ${figure.frames} frames.`);
+    }
+    if (!positions && !payload.features) {
+      throw new Error(`This result cannot be shown: figure "${figure.name}" has no motion.`);
     }
     return { ...figure, joints: positions, g: figure.g ?? null };
   });

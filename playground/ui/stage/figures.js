@@ -2,7 +2,7 @@
 
 import { css, mix, readable, systemColour } from "./colour.js";
 import { project } from "./camera.js";
-import { el } from "./dom.js";
+import { clear, el } from "./dom.js";
 import { findContacts, paintContacts, paintGrid, paintShadow, paintTrail } from "./floor.js";
 import { guidedJoints } from "./guidance.js";
 import { Painter, tonesOf } from "./paint.js";
@@ -11,12 +11,24 @@ import { createBody } from "./skeleton.js";
 const WORDS = 44; // pixels under the figures that belong to their names
 const AIR = 10; // pixels above them
 const SMOOTH = 10; // frames on either side over which the followed point is averaged
-const REACHING = ["pelvis", "head", "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_knee", "r_knee", "l_foot", "r_foot"];
+const REACHING = [ // joints that a body reaches farthest with
+  "pelvis", "head", "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_knee", "r_knee",
+  "l_foot", "r_foot",
+];
 
 export class Figures {
   constructor(canvas, labels, store, camera) {
-    Object.assign(this, { canvas, labels, store, camera, data: null, figures: [], theme: null, ratio: 1, spacing: 1.2 });
+    Object.assign(this, { canvas, labels, store, camera });
+    Object.assign(this, { data: null, figures: [], theme: null, ratio: 1, spacing: 1.2 });
     this.ctx = canvas.getContext("2d", { alpha: false });
+    this.layer = document.createElement("canvas"); // where a figure is painted that is to be seen through
+  }
+
+  clear() {
+    this.data = null;
+    this.figures = [];
+    this.labels.replaceChildren();
+    this.canvas.setAttribute("aria-label", "No motion yet");
   }
 
   setData(data) {
@@ -66,8 +78,8 @@ export class Figures {
 
   writeLabels() {
     for (const figure of this.figures) {
-      const name = el("strong", { text: figure.block.name }), caption = el("span", { text: figure.block.caption || "" });
-      figure.label = el("div", { class: "ms-label" }, name, caption);
+      const { name, caption = "" } = figure.block;
+      figure.label = el("div", { class: "ms-label" }, el("strong", { text: name }), el("span", { text: caption }));
     }
     this.labels.replaceChildren(...this.figures.map((figure) => figure.label));
     const told = this.figures.map(({ block }) => (block.caption ? `${block.name} (${block.caption})` : block.name));
@@ -107,11 +119,12 @@ export class Figures {
     return Math.max(least, Math.min(1.9, 0.8 * room));
   }
 
-  // The point that the camera follows at a frame: the first figure's way, smoothed; the origin where it follows nothing.
+  // The point that the camera follows at a frame: the first figure's way, smoothed; the origin when it does not follow.
   followed(frame) {
     if (!this.store.state.follow) return [0, 0];
     const { centre, frames } = this.figures[0];
-    const at = Math.min(Math.floor(frame), frames - 1), next = Math.min(at + 1, frames - 1), share = frame - Math.floor(frame);
+    const at = Math.min(Math.floor(frame), frames - 1), next = Math.min(at + 1, frames - 1);
+    const share = frame - Math.floor(frame);
     return [0, 1].map((i) => centre[2 * at + i] + (centre[2 * next + i] - centre[2 * at + i]) * share);
   }
 
@@ -119,7 +132,8 @@ export class Figures {
   fit() {
     if (!this.figures.length) return;
     const { follow } = this.store.state;
-    const tall = this.figures.reduce((high, { joints }) => maxEvery(joints, this.width, this.head + 1, high), 1.6) + 0.2;
+    const heads = this.figures.map(({ joints }) => maxEvery(joints, this.width, this.head + 1));
+    const tall = Math.max(1.6, ...heads) + 0.2;
     this.spacing = this.laneSpacing(tall);
     this.camera.place();
     const points = [], box = [Infinity, -Infinity, Infinity, -Infinity];
@@ -139,7 +153,18 @@ export class Figures {
       }
     });
     this.camera.target = follow ? [0, tall * 0.5, 0] : [(box[0] + box[1]) / 2, tall * 0.5, (box[2] + box[3]) / 2];
-    this.camera.fit(points);
+    this.fitCalmly(points);
+  }
+
+  // While a motion grows scale by scale the camera stays, unless the new one would not fit or would be tiny.
+  fitCalmly(points) {
+    const { camera, figures } = this, { follow, layout } = this.store.state;
+    const ids = figures.map((figure) => figure.block.id);
+    const scene = [this.data.frames, ...ids, camera.width, camera.height, follow, layout].join();
+    const before = scene === this.scene ? camera.fitted : 0;
+    camera.fit(points);
+    if (camera.fitted < before && camera.fitted > 0.75 * before) camera.fitted = before;
+    this.scene = scene;
   }
 
   poseAt(figure, frame) {
@@ -161,9 +186,9 @@ export class Figures {
 
   draw() {
     const { ctx, camera, theme } = this;
-    if (!this.data || !theme || camera.width < 2) return;
+    if (!theme || camera.width < 2) return;
     const { frame, follow } = this.store.state;
-    if (follow) [camera.target[0], camera.target[2]] = this.followed(frame);
+    if (follow && this.data) [camera.target[0], camera.target[2]] = this.followed(frame);
     camera.place();
     ctx.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     ctx.fillStyle = css(theme.surface);
@@ -185,8 +210,8 @@ export class Figures {
   }
 
   drawFigure(figure, [dx, dz], frame) {
-    const { ctx, camera, theme, screen, painter } = this, { ghost, layout } = this.store.state;
-    const twin = ghost && this.figures.find((other) => other.block.id === figure.block.ghost_of);
+    const { ctx, camera, theme, screen, painter, figures } = this, { ghost, layout } = this.store.state;
+    const twin = ghost && figures.find((other) => other.block.id === figure.block.ghost_of);
     if (twin) {
       this.poseAt(twin, frame);
       this.projectBody(dx, dz);
@@ -195,18 +220,33 @@ export class Figures {
     }
     this.poseAt(figure, frame);
     this.projectBody(dx, dz);
-    const over = frame >= figure.frames + 0.5; // a shorter motion has ended and waits
-    painter.paint(ctx, screen, camera.focal, figure.tones, over ? 0.45 : layout === "overlay" && this.figures.length > 1 ? 0.82 : 1);
+    if (frame >= figure.frames + 0.5) this.paintThrough(figure, 0.45); // a shorter motion has ended and waits
+    else if (layout === "overlay" && figures.length > 1) this.paintThrough(figure, figure === figures[0] ? 0.9 : 0.68);
+    else painter.paint(ctx, screen, camera.focal, figure.tones);
+  }
+
+  // Paints the projected body as one see-through shape, without its inside showing.
+  paintThrough(figure, alpha) {
+    const { canvas, layer, ctx, ratio } = this;
+    if (layer.width !== canvas.width) layer.width = canvas.width; // setting a size clears and costs
+    if (layer.height !== canvas.height) layer.height = canvas.height;
+    const over = clear(layer, ratio);
+    this.painter.paint(over, this.screen, this.camera.focal, figure.tones);
+    ctx.save();
+    ctx.setTransform(1, 0, 0, 1, 0, 0);
+    ctx.globalAlpha = alpha;
+    ctx.drawImage(layer, 0, 0);
+    ctx.restore();
   }
 
   placeLabels(lanes, frame) {
     const { camera, figures } = this, point = [0, 0, 0], room = camera.width / figures.length;
     const { follow, layout } = this.store.state;
     figures.forEach((figure, index) => {
-      let x = (index + 0.5) * room;
+      let x = camera.width / 2 + (index - (figures.length - 1) / 2) * Math.min(room, 140);
       if (layout !== "overlay") {
         const t = Math.min(Math.floor(frame), figure.frames - 1);
-        const [cx, cz] = follow ? [camera.target[0], camera.target[2]] : [figure.centre[2 * t], figure.centre[2 * t + 1]];
+        const [cx, cz] = follow ? [camera.target[0], camera.target[2]] : figure.centre.subarray(2 * t, 2 * t + 2);
         project(camera, cx + lanes[index][0], 0.9, cz + lanes[index][1], point, 0);
         x = point[0];
       }
@@ -219,8 +259,8 @@ export class Figures {
   }
 }
 
-function maxEvery(array, step, from, least) {
-  let most = least;
+function maxEvery(array, step, from) {
+  let most = -Infinity;
   for (let i = from; i < array.length; i += step) most = Math.max(most, array[i]);
   return most;
 }

@@ -40,7 +40,7 @@ export function paintGrid(ctx, camera, theme) {
   });
 }
 
-// Runs `paint` with the canvas in metres on the floor round (x, z): 1 unit right = 1 m along X, 1 unit down = 1 m along Z.
+// Runs `paint` with the canvas in metres on the floor round (x, z): right is along X, down along Z.
 export function onFloor(ctx, camera, x, z, paint) {
   project(camera, x, 0, z, spot, 0);
   const [px, py, depth] = spot;
@@ -61,7 +61,8 @@ export function paintShadow(ctx, camera, theme, pose, parents, dx, dz) {
     ctx.beginPath();
     for (let j = 1; j < parents.length; j++) {
       for (const [k, first] of [[parents[j], true], [j, false]]) {
-        const x = pose[3 * k] - x0 + pose[3 * k + 1] * SHADOW[0], z = pose[3 * k + 2] - z0 + pose[3 * k + 1] * SHADOW[1];
+        const height = pose[3 * k + 1];
+        const x = pose[3 * k] - x0 + height * SHADOW[0], z = pose[3 * k + 2] - z0 + height * SHADOW[1];
         if (first) ctx.moveTo(x, z);
         else ctx.lineTo(x, z);
       }
@@ -80,12 +81,13 @@ export function findContacts(joints, frames, names, fps) {
   const width = 3 * names.length;
   return ["l_", "r_"].flatMap((side) => {
     const ball = 3 * names.indexOf(`${side}foot`), ankle = 3 * names.indexOf(`${side}ankle`);
+    const between = (a, b) => Math.hypot(joints[a] - joints[b], joints[a + 2] - joints[b + 2]);
     let floor = Infinity;
     for (let t = 0; t < frames; t++) floor = Math.min(floor, joints[t * width + ball + 1]);
     const found = [];
     for (let t = 0; t < frames; t++) {
       const at = t * width, next = Math.min(t + 1, frames - 1) * width;
-      const moved = Math.hypot(joints[next + ball] - joints[at + ball], joints[next + ball + 2] - joints[at + ball + 2]);
+      const moved = between(next + ball, at + ball);
       if (joints[at + ball + 1] - floor > LOW || moved * fps > STILL) continue;
       const open = found.at(-1);
       if (open && open.stop === t) open.stop = t + 1;
@@ -123,8 +125,10 @@ export function paintTrail(ctx, camera, rgb, joints, frames, width, frame, dx, d
   for (const [from, to, alpha, line] of [[0, now, 0.85, 2], [now, frames - 1, 0.28, 1.5]]) {
     ctx.beginPath();
     for (let t = from; ; t = Math.min(Math.floor(t) + 1, to)) {
-      const at = Math.floor(t) * width, next = Math.min(Math.floor(t) + 1, frames - 1) * width, share = t - Math.floor(t);
-      const x = joints[at] + (joints[next] - joints[at]) * share, z = joints[at + 2] + (joints[next + 2] - joints[at + 2]) * share;
+      const whole = Math.floor(t), share = t - whole;
+      const at = whole * width, next = Math.min(whole + 1, frames - 1) * width;
+      const x = joints[at] + (joints[next] - joints[at]) * share;
+      const z = joints[at + 2] + (joints[next + 2] - joints[at + 2]) * share;
       project(camera, x + dx, 0.004, z + dz, spot, 0);
       if (t === from) ctx.moveTo(spot[0], spot[1]);
       else ctx.lineTo(spot[0], spot[1]);

@@ -37,7 +37,7 @@ export function addGestures(canvas, camera, { onMove, onReset }) {
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("dblclick", onReset);
 
-  // The page keeps its own scrolling: the wheel zooms with ctrl (which is also a trackpad's pinch) or once the stage is in use.
+  // The page keeps its own scrolling: the wheel zooms with ctrl (a trackpad's pinch, too) or once the stage is in use.
   canvas.addEventListener("wheel", (event) => {
     const inUse = canvas.closest(".ms")?.contains(document.activeElement);
     if (!event.ctrlKey && !event.metaKey && !inUse) return;

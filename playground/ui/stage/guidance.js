@@ -1,10 +1,10 @@
-// The one twin of Python code: recovery of 22 joints from 67 columns (systems.md A1; playground/motion/representation.py,
-// from_features67) and the blend m = (1 + g) m_c - g m_u in normalised space (A8). Tested against Python to 1e-4 m.
+// The one twin of Python code: recovery of 22 joints from 67 columns (systems.md A1; from_features67 of
+// playground/motion/representation.py) and the blend m = (1 + g) m_c - g m_u in normalised space (A8).
 
 const COLUMNS = 67;
 const JOINTS = 22;
 
-// features: {conditional, unconditional, mean, std}, the first two [F * 67]; returns joints Float32Array [F * 22 * 3], metres.
+// features: {conditional, unconditional, mean, std}, the first two [F * 67]; returns [F * 22 * 3] in metres.
 export function guidedJoints(features, g, out = null) {
   const frames = features.conditional.length / COLUMNS;
   const row = new Float64Array(frames * COLUMNS);
@@ -17,7 +17,7 @@ export function guidedJoints(features, g, out = null) {
   return recoverJoints(row, frames, out);
 }
 
-// rows: [F * 67] in metres and radians. Column 0 is half the yaw step, so cos and sin are taken of twice the running sum.
+// rows: [F * 67] in metres and radians. Column 0 is half the yaw step: cos and sin are of twice the running sum.
 export function recoverJoints(rows, frames, out = null) {
   const joints = out && out.length === frames * JOINTS * 3 ? out : new Float32Array(frames * JOINTS * 3);
   let half = 0, x = 0, z = 0;

@@ -1,11 +1,11 @@
-// The stage: figures, score and clock as one component. mount(element, payload, options) is the way in; see component.py.
+// The stage: figures, score and clock as one component. Way in: mount(element, payload, options).
 
 import { Stage } from "./stage.js";
 
 const mounted = new Map(); // name -> api
 const slots = new Map(); // name -> element that shows the score of that stage
 
-// options: {name, onEvent(event, detail), height, empty, autoplay, controls}
+// options: {name, onEvent(event, detail), height, empty, autoplay}
 export function mount(element, payload = null, options = {}) {
   const stage = new Stage(element, options);
   if (options.name) {

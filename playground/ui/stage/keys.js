@@ -45,8 +45,8 @@ function press(stage, event, target) {
     case "Home": return jump(0);
     case "End": return jump(state.frames - 1);
     case "Escape": return clearChoice(store);
-    case "[": return jump(state.frame) && mark(store, Math.floor(state.frame), state.span ? state.span[1] : state.frames);
-    case "]": return jump(state.frame) && mark(store, state.span ? state.span[0] : 0, Math.floor(state.frame) + 1);
+    case "[": return markSpan(store, Math.floor(state.frame), state.span ? state.span[1] : state.frames);
+    case "]": return markSpan(store, state.span ? state.span[0] : 0, Math.floor(state.frame) + 1);
     case "+": case "=": return camera.zoomBy(1.15) || moved();
     case "-": return camera.zoomBy(1 / 1.15) || moved();
     case "l": return flip("loop");
@@ -82,7 +82,8 @@ function stepToken(stage, by) {
   const cell = current(stage);
   if (!cell) return false;
   const track = getData().tracks[cell.track], size = track.levels[cell.level].size;
-  return goTo(stage, { ...cell, position: Math.min(size - 1, Math.max(0, cell.position + by)) }, !!store.state.selection);
+  const position = Math.min(size - 1, Math.max(0, cell.position + by));
+  return goTo(stage, { ...cell, position }, Boolean(store.state.selection));
 }
 
 function stepScale(stage, by) {
@@ -114,7 +115,8 @@ function selectUnderPlayhead(stage) {
   return true;
 }
 
-function mark(store, start, stop) {
+function markSpan(store, start, stop) {
+  store.set({ playing: false });
   store.commit("span", { span: stop > start ? [start, stop] : null });
   return true;
 }

@@ -56,9 +56,8 @@ export class Painter {
     this.order.sort((a, b) => b.depth - a.depth);
   }
 
-  paint(ctx, screen, focal, tones, alpha = 1) {
+  paint(ctx, screen, focal, tones) {
     this.measure(screen, focal);
-    ctx.globalAlpha = alpha;
     ctx.lineJoin = "bevel"; // hulls turn so little at each corner that it does not show
     ctx.lineCap = "butt";
     this.silhouette(ctx, tones.outline);
@@ -73,7 +72,6 @@ export class Painter {
       ctx.fillStyle = light(ctx, shape.parts, tones[shape.tone]);
       ctx.fill();
     }
-    ctx.globalAlpha = 1;
   }
 
   paintFlat(ctx, screen, focal, fill, line) {
@@ -154,11 +152,14 @@ function light(ctx, parts, [lit, base, shade]) {
   const across = 0.5 * Math.atan2(2 * xy, xx - yy) + Math.PI / 2;
   const thin = Math.hypot(xx - yy, 2 * xy) / (xx + yy || 1); // 0 round, 1 thin
   const sign = Math.cos(across) * LIGHT[0] + Math.sin(across) * LIGHT[1] < 0 ? -1 : 1;
-  const ax = sign * Math.cos(across) * thin + LIGHT[0] * (1 - thin), ay = sign * Math.sin(across) * thin + LIGHT[1] * (1 - thin);
+  const ax = sign * Math.cos(across) * thin + LIGHT[0] * (1 - thin);
+  const ay = sign * Math.sin(across) * thin + LIGHT[1] * (1 - thin);
   const norm = Math.hypot(ax, ay) || 1;
   let reach = 0;
   for (const { points } of parts) {
-    for (let k = 0; k < 2 * TURN; k += 2) reach = Math.max(reach, Math.abs((points[k] - x) * ax + (points[k + 1] - y) * ay) / norm);
+    for (let k = 0; k < 2 * TURN; k += 2) {
+      reach = Math.max(reach, Math.abs((points[k] - x) * ax + (points[k + 1] - y) * ay) / norm);
+    }
   }
   const gx = (ax / norm) * reach, gy = (ay / norm) * reach;
   const gradient = ctx.createLinearGradient(x - gx, y - gy, x + gx, y + gy);

@@ -49,13 +49,15 @@ export function describeCell(tracks, { track: index, level, position }, fps) {
   const track = tracks[index], row = track.levels[level];
   const [from, to] = shareOf(track, level, position);
   const id = row.ids ? row.ids[position] : null;
+  const when = `${(from / fps).toFixed(2)}–${(to / fps).toFixed(2)} s`;
   const lines = [
     [`${track.name}, scale ${level + 1}`, `token ${position + 1} of ${row.size}`],
-    [id === null ? "still to come" : `code ${id} of ${row.codes}`, `${(from / fps).toFixed(2)}–${(to / fps).toFixed(2)} s`],
+    [id === null ? "still to come" : `code ${id} of ${row.codes}`, when],
   ];
   if (row.entropy) {
     const share = row.entropy[position] / Math.log(Math.max(2, row.codes));
-    lines.push([`entropy ${row.entropy[position].toPrecision(2)} nats`, `${Math.round(100 * share)} % of the most it could be`]);
+    const percent = `${Math.round(100 * share)} % of the most possible`;
+    lines.push([`entropy ${row.entropy[position].toPrecision(2)} nats`, percent]);
   }
   return lines;
 }

@@ -7,8 +7,8 @@ import { spanOf, tokenAt } from "./store.js";
 
 export const GUTTER = 36; // pixels left of the roll, for the scales' numbers
 export const MARGIN = 14; // pixels right of it, so that the playhead's end is seen
-const NARROW = 9; // pixels of the finest cell below which the roll gets cells of WIDER and scrolls sideways inside itself
-const WIDER = 13;
+const NARROW = 9; // pixels: where the finest cell would be narrower than this,
+const WIDER = 13; // it gets this many, and the roll scrolls sideways inside itself
 const DIGIT = 6.2; // pixels of one digit of an id
 
 export class Score {
@@ -20,7 +20,7 @@ export class Score {
     this.moving = el("canvas", { class: "ms-moving", "aria-hidden": "true" });
     this.playhead = el("i", { class: "ms-playhead" });
     this.roll = el("div", { class: "ms-roll" }, this.still, this.moving, this.playhead);
-    this.scroller = el("div", { class: "ms-scroll" }, this.roll);
+    this.scroller = el("div", { class: "ms-scroll", role: "group", "aria-label": "Tokens over time" }, this.roll);
     this.heads = el("div", { class: "ms-heads" });
     this.tip = el("div", { class: "ms-tip", role: "tooltip", hidden: true });
     this.element = el("div", { class: "ms-tracks", hidden: true }, this.gutter, this.scroller, this.heads, this.tip);
@@ -32,7 +32,8 @@ export class Score {
     this.laid = layRows(data.tracks);
     this.element.hidden = !data.tracks.length;
     this.still.setAttribute("aria-label", summary(data.tracks));
-    this.heads.replaceChildren(...data.tracks.map((track, index) => head(track, this.laid.heads[index].y)));
+    this.heads.replaceChildren(...data.tracks.map((track, index) => this.head(track, this.laid.heads[index].y)));
+    this.under = null;
     this.showTip(null);
   }
 
@@ -57,7 +58,10 @@ export class Score {
 
   tellView() {
     const { clientWidth: seen, scrollLeft } = this.scroller;
-    if (!this.data || !seen || seen >= this.width + MARGIN - 1) return this.onView(null);
+    const scrolls = this.data && seen > 0 && seen < this.width + MARGIN - 1;
+    this.scroller.toggleAttribute("tabindex", scrolls);
+    if (scrolls) this.scroller.tabIndex = 0;
+    if (!scrolls) return this.onView(null);
     const frameAt = (x) => Math.min(Math.max((x / this.width) * this.data.frames, 0), this.data.frames);
     this.onView([frameAt(scrollLeft), frameAt(scrollLeft + seen)]);
   }
@@ -189,8 +193,9 @@ export class Score {
   }
 
   cellOf(event) {
-    const box = this.roll.getBoundingClientRect(), { data, laid } = this;
-    return data && cellAt(data.tracks, laid.rows, event.clientX - box.left, event.clientY - box.top, data.frames, this.width);
+    const box = this.roll.getBoundingClientRect(), { data, laid, width } = this;
+    const x = event.clientX - box.left, y = event.clientY - box.top;
+    return data && cellAt(data.tracks, laid.rows, x, y, data.frames, width);
   }
 
   listen() {
@@ -212,25 +217,44 @@ export class Score {
   }
 
   showTip(cell, event) {
-    const { tip } = this;
-    tip.hidden = !cell;
-    if (!cell) return;
+    if (!cell) return void (this.tip.hidden = true);
     const lines = describeCell(this.data.tracks, cell, this.data.fps);
-    tip.replaceChildren(...lines.map((line) => el("div", {}, ...line.map((text) => el("span", { text })))));
-    const box = this.element.getBoundingClientRect();
-    const x = Math.min(event.clientX - box.left + 14, box.width - tip.offsetWidth - 4);
-    tip.style.transform = `translate(${Math.max(4, x)}px, ${event.clientY - box.top + 18}px)`;
+    const content = lines.map((line) => el("div", {}, ...line.map((text) => el("span", { text }))));
+    this.placeTip(event.clientX + 14, event.clientY + 18, content);
+  }
+
+  // x, y: in the window.
+  placeTip(x, y, content) {
+    const { tip } = this, box = this.element.getBoundingClientRect();
+    tip.hidden = false;
+    tip.replaceChildren(...content);
+    const left = Math.max(4, Math.min(x - box.left, box.width - tip.offsetWidth - 4));
+    tip.style.transform = `translate(${left}px, ${y - box.top}px)`;
+  }
+
+  head(track, y) {
+    const node = head(track, y), note = node.querySelector(".ms-note");
+    const show = () => {
+      const box = note.getBoundingClientRect();
+      this.placeTip(box.left, box.bottom + 4, [el("p", { text: track.note })]);
+    };
+    for (const event of ["pointerenter", "focus"]) note?.addEventListener(event, show);
+    for (const event of ["pointerleave", "blur"]) note?.addEventListener(event, () => (this.tip.hidden = true));
+    return node;
   }
 }
 
 function head(track, y) {
-  const tokens = track.levels.reduce((sum, level) => sum + (level.ids ? level.size : 0), 0), scales = track.levels.length;
+  const scales = track.levels.length;
+  const tokens = track.levels.reduce((sum, level) => sum + (level.ids ? level.size : 0), 0);
   const node = el(
-    "div", { class: "ms-head", style: `top:${y}px` }, el("i", { class: "ms-swatch" }), el("strong", { text: track.name }),
+    "div", { class: "ms-head", style: `top:${y}px` },
+    el("i", { class: "ms-swatch" }),
+    el("strong", { text: track.name }),
     el("span", { text: `${tokens} tokens in ${scales} ${scales === 1 ? "scale" : "scales"}` }),
   );
   if (track.levels.some((level) => level.entropy)) node.append(el("span", { text: "faint: unsure" }));
-  if (track.note) node.append(el("span", { class: "ms-note", text: track.note, title: track.note }));
+  if (track.note) node.append(el("span", { class: "ms-note", text: track.note, tabindex: "0" }));
   return node;
 }
 

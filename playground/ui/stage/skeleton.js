@@ -1,5 +1,5 @@
 // Flesh on the bones: a body of spheres round the joints, and the parts that are hulls of those spheres.
-// Joint names and parents come with the payload (playground/motion/skeleton.py); only the drawing's own radii live here.
+// Joint names and parents come with the payload (playground/motion/skeleton.py); here is the drawing only.
 
 // name: [kind, ..., radius in metres].
 //   joint NAME · between A B share · beyond A B metres (past B) · off NAME frame [left, up, forward] metres
@@ -65,7 +65,7 @@ function limbShapes(side) {
   ];
 }
 
-// Parts that are painted together, as one shape; `behind` moves a shape back in metres, so that its neighbour covers the seam.
+// Parts that are painted as one shape; `behind` moves a shape back, in metres, so that its neighbour covers the seam.
 const SHAPES = [
   {
     tone: "M",
@@ -79,7 +79,7 @@ const SHAPES = [
   { tone: "M", behind: 0.16, parts: [[["throat", "skullBase"], ["throat", "skullBase"]]] },
   { tone: "H", behind: 0, parts: [[["skullBase", "jaw", "brow", "crown"], []]] },
   { tone: "H", behind: 0.2, parts: [[["bridge", "nose"], ["bridge", "nose"]]] }, // shows in the profile only
-  { tone: "V", behind: 0, parts: [[["eyeL", "eyes", "eyeR"], ["eyeL", "eyes", "eyeR"]]] }, // a visor: where the face looks
+  { tone: "V", behind: 0, parts: [[["eyeL", "eyes", "eyeR"], ["eyeL", "eyes", "eyeR"]]] }, // a visor tells the face
   ...limbShapes("L"), ...limbShapes("R"),
 ];
 
@@ -122,7 +122,9 @@ function compile(recipe, joint) {
   if (kind === "off") {
     return (pose, frames, out, at) => {
       const frame = frames[b];
-      for (let i = 0; i < 3; i++) out[at + i] = pose[from + i] + frame[i] * c[0] + frame[3 + i] * c[1] + frame[6 + i] * c[2];
+      for (let i = 0; i < 3; i++) {
+        out[at + i] = pose[from + i] + frame[i] * c[0] + frame[3 + i] * c[1] + frame[6 + i] * c[2];
+      }
     };
   }
   const foot = 3 * joint[c];

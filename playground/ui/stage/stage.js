@@ -7,17 +7,19 @@ import { el } from "./dom.js";
 import { Figures } from "./figures.js";
 import { addGestures } from "./gestures.js";
 import { listenToKeys } from "./keys.js";
+import { Notices } from "./notices.js";
 import { describeCell } from "./rows.js";
 import { GUTTER, MARGIN, Score } from "./score.js";
 import { COMMITS, createStore } from "./store.js";
 import { Timeline } from "./timeline.js";
 import { Toolbar } from "./toolbar.js";
 
+const UNREADABLE = "This result cannot be shown: it is not readable.";
 const SLOW = 0.036; // seconds a frame: where drawing takes longer, the figures get one pixel a CSS pixel
 
 export class Stage {
   constructor(element, options) {
-    this.options = { height: 320, empty: "Choose a motion or type a prompt. The figure and its tokens appear here.", ...options };
+    this.options = { height: 320, ...options };
     this.store = createStore();
     this.camera = createCamera();
     this.data = null;
@@ -30,20 +32,18 @@ export class Stage {
   build(host) {
     const canvas = el("canvas", { class: "ms-canvas", role: "img", "aria-label": "No motion yet" });
     const labels = el("div", { class: "ms-labels" });
-    this.badge = el("div", { class: "ms-badge", hidden: true });
-    this.notice = el("div", { class: "ms-notice", role: "status", text: this.options.empty });
-    this.error = el("div", { class: "ms-error", role: "alert", hidden: true });
-    this.spoken = el("div", { class: "ms-spoken", "aria-live": "polite" });
-    this.picture = el("div", { class: "ms-picture" }, canvas, labels, this.badge, this.notice, el("div", { class: "ms-progress" }));
-    this.picture.style.height = typeof this.options.height === "number" ? `${this.options.height}px` : this.options.height;
+    const { badge, notice, progress, error, spoken } = (this.notices = new Notices(this.options.empty));
+    this.picture = el("div", { class: "ms-picture" }, canvas, labels, badge, notice, progress);
+    this.picture.style.height = `${this.options.height}px`;
     this.figures = new Figures(canvas, labels, this.store, this.camera);
     this.toolbar = new Toolbar(this.store, { onReset: () => this.resetView() });
     this.timeline = new Timeline(this.store, () => this.data);
     this.score = new Score(this.store, { onView: (view) => this.setView(view) });
     this.scorePart = el("div", { class: "ms-score ms" }, this.timeline.element, this.score.element);
     this.element = el(
-      "section", { class: "ms is-empty", tabindex: "0", "aria-label": "Stage: figures and tokens. Space plays, arrows step." },
-      this.picture, this.toolbar.element, this.error, this.scorePart, this.spoken,
+      "section",
+      { class: "ms is-empty", tabindex: "0", "aria-label": "Stage: figures and tokens. Space plays, arrows step." },
+      this.picture, this.toolbar.element, error, this.scorePart, spoken,
     );
     host.replaceChildren(this.element);
     addGestures(canvas, this.camera, { onMove: () => this.redraw("figures"), onReset: () => this.resetView() });
@@ -57,7 +57,9 @@ export class Stage {
       listenToKeys({
         element: this.element, store, camera: this.camera,
         owns: (node) => this.element.contains(node) || this.scorePart.contains(node),
-        getData: () => this.data, locate: (selection) => this.score.locate(selection), onCamera: () => this.redraw("figures"),
+        getData: () => this.data,
+        locate: (selection) => this.score.locate(selection),
+        onCamera: () => this.redraw("figures"),
       }),
     ];
     this.watchSize = new ResizeObserver(() => this.redraw("layout"));
@@ -75,54 +77,53 @@ export class Stage {
   setPayload(payload) {
     try {
       const parsed = typeof payload === "string" && payload ? JSON.parse(payload) : payload;
-      if (parsed && parsed.state) return this.say(parsed.state, parsed.message);
+      if (parsed?.state === "empty") return this.clear(parsed.message);
+      if (parsed?.state) return this.say(parsed.state, parsed.message);
       this.data = parsed ? decodePayload(parsed) : null;
     } catch (error) {
-      return this.say("error", error instanceof SyntaxError ? "This result cannot be shown: it is not readable." : error.message);
+      return this.say("error", error instanceof SyntaxError ? UNREADABLE : error.message);
     }
-    this.say(this.data ? "ready" : "empty", this.options.empty);
-    if (this.data) this.show(this.data);
+    if (!this.data) return this.clear();
+    this.say("ready");
+    this.show(this.data);
+  }
+
+  clear(text = "") {
+    this.data = null;
+    this.store.set({ playing: false, selection: null, span: null, hover: null });
+    this.figures.clear();
+    this.toolbar.fitTo(null);
+    this.notices.showBadge(null);
+    this.say("empty", text);
+    this.redraw("layout");
   }
 
   show(data) {
-    const first = !this.shape, shape = data.figures.map((figure) => figure.id).join();
-    const { state } = this.store;
-    const patch = { frames: data.frames, fps: data.fps, frame: Math.min(state.frame, data.frames - 1), hover: null };
-    if (data.features && this.guidanceOf !== data.features.figure) {
-      this.guidanceOf = data.features.figure;
-      patch.guidance = data.features.guidance;
-    }
-    if (state.span && state.span[1] > data.frames) patch.span = null;
+    const first = !this.scene, { state } = this.store;
+    const scene = [data.frames, ...data.figures.map((figure) => figure.id)].join();
+    const patch = { frames: data.frames, fps: data.fps, hover: null };
+    if (data.features) patch.guidance = data.features.guidance;
+    // The same scene told again (a re-decode, one more scale) goes on where it was; another one starts anew.
+    if (scene !== this.scene) Object.assign(patch, { frame: 0, selection: null, span: null });
+    this.scene = scene;
     this.store.set(patch);
     this.figures.setData(data);
     this.score.setData(data);
     this.toolbar.fitTo(data);
     this.toolbar.show();
-    this.showBadge(data.badge);
-    this.element.classList.toggle("has-tracks", data.tracks.length > 0);
-    this.shape = shape;
+    this.notices.showBadge(data.badge);
     this.redraw("layout", "theme");
     if (first && (this.options.autoplay ?? true) && !this.calm.matches) this.store.set({ playing: true });
   }
 
-  showBadge(badge) {
-    this.badge.hidden = !badge;
-    if (!badge) return;
-    const time = badge.seconds === null || badge.seconds === undefined ? "" : `, ${badge.seconds.toPrecision(2)} s`;
-    this.badge.textContent = `${badge.kind}${time}`;
-    this.badge.dataset.kind = badge.kind;
-    this.badge.title = badge.text || (badge.kind === "live" ? "Computed just now" : "A stored result");
-  }
-
   // "loading" and "error" keep the last result; "empty" and "ready" end both.
   say(state, text = "") {
-    const was = this.element.classList;
-    was.toggle("is-loading", state === "loading");
-    was.toggle("is-empty", !this.data);
+    for (const { classList } of [this.element, this.scorePart]) {
+      classList.toggle("is-loading", state === "loading");
+      classList.toggle("is-empty", !this.data);
+    }
     this.element.setAttribute("aria-busy", String(state === "loading"));
-    this.error.hidden = state !== "error";
-    this.error.textContent = state === "error" ? text : "";
-    this.notice.textContent = state === "loading" ? text || "Working" : this.data ? "" : this.options.empty;
+    this.notices.say(state, text, Boolean(this.data));
   }
 
   changed(changed) {
@@ -138,8 +139,7 @@ export class Stage {
 
   speak() {
     const cell = this.score.locate(this.store.state.selection);
-    const text = cell ? describeCell(this.data.tracks, cell, this.data.fps).flat().join(", ") : "";
-    this.spoken.textContent = text;
+    this.notices.speak(cell ? describeCell(this.data.tracks, cell, this.data.fps).flat().join(", ") : "");
   }
 
   redraw(...what) {
@@ -219,11 +219,7 @@ export class Stage {
     this.redraw("layout");
   }
 
-  // The rest of what others may call.
-  update(payload) {
-    this.setPayload(payload);
-  }
-
+  // The rest of what others may call; setPayload and say belong to it too.
   busy(text = "Working") {
     this.say("loading", text);
   }
@@ -241,12 +237,12 @@ export class Stage {
     this.store.set({ scale: scale || null, scaleMode: mode });
   }
 
-  play() {
-    this.store.set({ playing: true });
+  play(playing = true) {
+    this.store.set({ playing });
   }
 
   pause() {
-    this.store.set({ playing: false });
+    this.play(false);
   }
 
   seek(frame) {

@@ -66,11 +66,9 @@ export function createStore() {
   // A choice that is final: every view shows it, and Python hears of it.
   function commit(event, patch) {
     set(patch);
-    emit(event, event === "select" ? state.selection : event === "span" ? state.span && spanDetail() : { scale: state.scale });
-  }
-
-  function spanDetail() {
-    return { start: state.span[0], stop: state.span[1] };
+    if (event === "select") emit(event, state.selection);
+    if (event === "span") emit(event, state.span && { start: state.span[0], stop: state.span[1] });
+    if (event === "scale") emit(event, { scale: state.scale });
   }
 
   return { state, on, emit, set, seek, advance, commit };

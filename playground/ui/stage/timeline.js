@@ -9,7 +9,8 @@ const BAR = HEIGHT - 9; // top of the bar
 
 export class Timeline {
   constructor(store, getData) {
-    Object.assign(this, { store, getData, width: 0, left: 0, right: 0, ratio: 1, theme: null, view: null, spanMode: false });
+    Object.assign(this, { store, getData, width: 0, left: 0, right: 0, ratio: 1 });
+    Object.assign(this, { theme: null, view: null, spanMode: false });
     this.canvas = el("canvas", { "aria-hidden": "true" });
     this.elapsed = el("i", { class: "ms-elapsed" });
     this.knob = el("i", { class: "ms-knob" });
@@ -119,7 +120,8 @@ export class Timeline {
       if (!drag) return;
       const { span, from, playing } = drag;
       drag = null;
-      const chosen = event.type === "pointerup" ? spanBetween(from, this.frameAt(event), store.state.frames) : store.state.span;
+      const { state } = store, released = event.type === "pointerup";
+      const chosen = released ? spanBetween(from, this.frameAt(event), state.frames) : state.span;
       if (span) store.commit("span", { span: chosen });
       store.set({ playing });
     };

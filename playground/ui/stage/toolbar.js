@@ -24,13 +24,14 @@ export class Toolbar {
     next.append(icon("next"));
     this.now = el("span", { class: "ms-now" });
     this.total = el("span", { class: "ms-total" });
-    this.speeds = SPEEDS.map((speed) => button(`${speed}×`, `Play at ${speed} times the speed`, () => store.set({ speed })));
+    this.speeds = SPEEDS.map((speed) =>
+      button(`${speed}×`, `Play at ${speed} times the speed`, () => store.set({ speed })));
     this.toggles = Object.fromEntries(Object.entries(TOGGLES).map(([key, [text, title]]) =>
       [key, button(text, title, () => store.set({ [key]: !state[key] }))]));
     this.overlay = button("Overlay", "Put all figures on one spot (O)", () => toggleLayout(store));
     this.reset = button("Reset view", "Camera back to its place (R)", onReset);
     this.element = el(
-      "div", { class: "ms-toolbar", role: "toolbar", "aria-label": "Playback" },
+      "div", { class: "ms-toolbar", role: "group", "aria-label": "Playback" },
       el("div", { class: "ms-group" }, back, this.play, next),
       el("div", { class: "ms-time" }, this.now, this.total),
       el("div", { class: "ms-group", role: "group", "aria-label": "Speed" }, ...this.speeds),
@@ -72,7 +73,8 @@ export class Toolbar {
 }
 
 function button(text, title, onClick, extra = "") {
-  const node = el("button", { type: "button", class: `ms-button ${extra}`, text, title, "aria-label": text ? null : title });
+  const label = text ? null : title;
+  const node = el("button", { type: "button", class: `ms-button ${extra}`, text, title, "aria-label": label });
   node.addEventListener("click", onClick);
   return node;
 }
