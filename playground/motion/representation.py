@@ -103,12 +103,15 @@ class Normaliser:
 
     @classmethod
     def fit(cls, rows: Iterable[Array], groups: Sequence[Sequence[int]] = GROUPS) -> "Normaliser":
-        """Mean per column over all rows [F, C]; std per column, then averaged inside each group of columns (A1)."""
+        """Mean per column over all rows [F, C]; std per column, then averaged inside each group of columns (A1).
+
+        A group that never varies gets std 1.
+        """
         data = np.concatenate([np.asarray(r, np.float64) for r in rows])
         std = data.std(axis=0)
         for group in groups:
             std[list(group)] = std[list(group)].mean()
-        return cls(data.mean(axis=0).astype(np.float32), np.maximum(std, 1e-6).astype(np.float32))
+        return cls(data.mean(axis=0).astype(np.float32), np.where(std > 1e-6, std, 1.0).astype(np.float32))
 
     def apply(self, features: Array) -> NDArray[np.float32]:
         """Un-normalised features [..., C] -> normalised float32."""

@@ -1,6 +1,7 @@
 """The one training loop, on Lightning Fabric: CPU, one GPU or several machines, resumable at any saved step."""
 
 import json
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -53,11 +54,16 @@ class Launch:
 def start_fabric(launch: Launch, out: Path) -> Fabric:
     """A launched Fabric that logs to TensorBoard under `out`."""
     precision = "bf16-mixed" if launch.precision == "auto" else launch.precision
-    devices = 1 if launch.accelerator == "cpu" and launch.devices == "auto" else launch.devices
+    devices, nodes = launch.devices, launch.nodes
+    if "LOCAL_WORLD_SIZE" in os.environ:  # started by torchrun, which has decided already
+        devices = int(os.environ["LOCAL_WORLD_SIZE"])
+        nodes = int(os.environ["WORLD_SIZE"]) // devices
+    elif devices == "auto":
+        devices = 1
     fabric = Fabric(
         accelerator=launch.accelerator,
         devices=devices,
-        num_nodes=launch.nodes,
+        num_nodes=nodes,
         strategy=launch.strategy,
         precision=precision,  # type: ignore[arg-type]
         loggers=TensorBoardLogger(out, name="tensorboard", version=""),
@@ -72,6 +78,7 @@ def fit(
     schedule: Schedule,
     out: Path,
     *,
+    seed: int = 0,
     resume: bool = False,
     on_step: Callable[[int, float], None] | None = None,
 ) -> dict[str, Any]:
@@ -79,6 +86,20 @@ def fit(
 
     Saved states stand in `out`/state.safetensors. PlaygroundError if there is one and `resume` is not set.
     """
+    # The random state is the run's own, and a part of what is saved; the caller's is given back.
+    with torch.random.fork_rng(devices=[fabric.device] if fabric.device.type == "cuda" else []):
+        torch.manual_seed(seed + fabric.global_rank)
+        return _fit(fabric, task, schedule, out, resume, on_step)
+
+
+def _fit(
+    fabric: Fabric,
+    task: Task,
+    schedule: Schedule,
+    out: Path,
+    resume: bool,
+    on_step: Callable[[int, float], None] | None,
+) -> dict[str, Any]:
     state_path = out / "state.safetensors"
     if state_path.exists() and not resume:
         raise PlaygroundError(f"{out} already holds a run; add --resume to go on with it, or name another folder")

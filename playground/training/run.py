@@ -82,7 +82,7 @@ def _train_tokenizer(
         torch.manual_seed(config.seed)
         model = build_tokenizer(replace(config.model, text_width=encoder.width))
     task = TokenizerTask(model, config, batches, validation, store, encoder, library.name, fabric.device)
-    return fit(fabric, task, config.schedule, out, resume=resume, on_step=on_step)
+    return fit(fabric, task, config.schedule, out, seed=config.seed, resume=resume, on_step=on_step)
 
 
 def _train_generator(
@@ -119,7 +119,7 @@ def _train_generator(
     task = GeneratorTask(
         model, tokenizer.quantizer, config, bank, checked, store, encoder, library.name, card.hash[:12], fabric.device
     )
-    return fit(fabric, task, config.schedule, out / "generator", resume=resume, on_step=on_step)
+    return fit(fabric, task, config.schedule, out / "generator", seed=config.seed, resume=resume, on_step=on_step)
 
 
 def generator_config(config: GeneratorTraining, tokenizer: LGTok, text_width: int) -> GeneratorConfig:
