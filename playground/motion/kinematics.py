@@ -180,6 +180,7 @@ def make_rigid(joints: Array) -> RigidMotion:
                 bone = _bone(joints[:, joint] - placed[:, parent], joint) * lengths[joint]
             placed[:, joint] = placed[:, parent] + bone
     _hold_feet(placed, joints, np.linalg.norm(offsets, axis=-1))
+    placed += (joints - placed).mean(axis=1, keepdims=True)
     return RigidMotion(placed, offsets, float(np.linalg.norm(placed - joints, axis=-1).max()))
 
 

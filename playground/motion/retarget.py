@@ -87,7 +87,7 @@ def _body(source: Source, joints: JointMap) -> _Body:
     pose = standing_rest(source, joints)
     hips = rest[roles["l_hip"]] - rest[roles["r_hip"]]
     if pose.stands:
-        neutral = _basis(hips, pose.up, "pelvis")
+        neutral = qmul(_basis(hips, pose.up, "pelvis"), qinv(_basis(OFFSETS[1] - OFFSETS[2], _UP, "pelvis")))
         return _Body(True, neutral, *(qmul(source.rotations[:, part], neutral) for part in parts))
     middle = (rest[roles["l_hip"]] + rest[roles["r_hip"]]) / 2.0 - rest[joints.pelvis]
     low = _basis(hips, _below(source, joints.pelvis, joints.chest) - middle, "pelvis")
@@ -207,8 +207,8 @@ def _onto_human22(source: Source, joints: JointMap) -> Array:
 
 def _is_canonical(joints: Array) -> bool:
     """True for HUMAN22 joints that stand on the floor at the origin, facing +Z, as the playground writes them."""
-    start = np.array([joints[0, 0, 0], joints[0, 0, 2], joints[..., 1].min(), heading(joints[:1], smooth=False)[0]])
-    return bool(np.abs(start).max() < 2e-3)
+    start = np.array([joints[0, 0, 0], joints[0, 0, 2], joints[..., 1].min()])
+    return bool(np.abs(start).max() < 2e-3 and abs(heading(joints[:1], smooth=False)[0]) < 0.02)
 
 
 def _as_it_is(source: Source) -> Array | None:
@@ -221,7 +221,7 @@ def _as_it_is(source: Source) -> Array | None:
 
 def _finished(joints: Array, mapping: str, changes: list[str]) -> Retargeted:
     """Canonical joints within the limits. PlaygroundError if somebody travels farther than `LIMITS.max_metres`."""
-    canonical = canonicalise(joints)
+    canonical = joints.astype(np.float32) if _is_canonical(joints) else canonicalise(joints)
     farthest = float(np.abs(canonical).max())
     if not farthest <= LIMITS.max_metres:
         raise PlaygroundError(
@@ -249,9 +249,10 @@ def _sized(leg: float) -> tuple[float, str]:
     return factor, f"lengths were taken to be in {unit_name} and scaled by {factor / metres:.3f} to the reference leg"
 
 
-def retarget(source: Source, start_seconds: float = 0.0) -> Retargeted:
+def retarget(source: Source, start_seconds: float = 0.0, upright: bool = False) -> Retargeted:
     """A motion on any two-legged skeleton -> canonical HUMAN22 joints at 20 fps from `start_seconds` on.
 
+    upright: the source is known to have Y up. Otherwise axes are looked for unless it is canonical already.
     HUMAN22 motions that have the reference bones already keep their joints. PlaygroundError if the skeleton is not
     understood, nothing is left after the start, or the motion does not fit the limits.
     """
@@ -263,7 +264,7 @@ def retarget(source: Source, start_seconds: float = 0.0) -> Retargeted:
     frames = source.frames
     source = _without_jump(source, leg)
     same = _as_it_is(source)
-    if same is None or not _is_canonical(same):
+    if not upright and (same is None or not _is_canonical(same)):
         source, changes = made_upright(source, joints, leg)
     if source.frames < frames:
         changes.append("the first frame, a pose from which the body jumps, was left out")

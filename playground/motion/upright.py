@@ -58,7 +58,7 @@ def standing_rest(source: Source, joints: JointMap) -> Standing:
         spine = rest[[joints.roles["l_shoulder"], joints.roles["r_shoulder"]]].mean(0) - rest[hips].mean(0)
     up = unit(spine)
     legs = [unit(rest[joints.roles[f"{side}_ankle"]] - rest[joints.roles[f"{side}_hip"]]) for side in "lr"]
-    stands = source.has_rest and all(float(leg @ up) < -0.8 for leg in legs)
+    stands = all(float(leg @ up) < -0.8 for leg in legs)
     snapped = max((axis for axis, _ in AXES), key=lambda axis: float(axis @ up))
     return Standing(snapped if stands and float(snapped @ up) > 0.94 else up, stands)
 
@@ -77,7 +77,7 @@ def up_axis(source: Source, joints: JointMap, leg: float) -> tuple[Array, str]:
     def score(axis: Array, name: str) -> float:
         upright = float(np.mean(body @ axis > 0.7))
         lowest = float(np.percentile((positions @ axis).min(axis=1), 5))
-        t_pose = rest.stands and float(rest.up @ axis) > 0.94
+        t_pose = source.has_rest and rest.stands and float(rest.up @ axis) > 0.94
         return upright + 0.6 * t_pose + 0.5 * (abs(lowest) < 0.15 * leg) + 0.3 * (name == "Y")
 
     return max(AXES, key=lambda entry: score(*entry))

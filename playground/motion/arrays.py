@@ -1,0 +1,143 @@
+"""npy and npz files from strangers: what a header declares is checked before a byte is allocated; no pickle, ever."""
+
+import io
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import prod
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+
+MAX_MEMBERS = 64  # arrays in one npz file
+MAX_BYTES = 8 * LIMITS.max_upload_bytes  # one array in memory
+_BROKEN = (ValueError, SyntaxError, TypeError, KeyError, RecursionError, MemoryError, OverflowError, EOFError, OSError)
+_BAD_ZIP = (*_BROKEN, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, struct.error)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What an npy header declares; nothing is read yet."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    fortran: bool
+
+    @property
+    def size(self) -> int:
+        """Bytes of the array."""
+        return prod(self.shape) * self.dtype.itemsize
+
+
+def read_header(stream: IO[bytes], what: str) -> Header:
+    """The header at the start of an npy stream. PlaygroundError unless it declares numbers or text of a sane size."""
+    try:
+        version = npy.read_magic(stream)
+        if version not in ((1, 0), (2, 0)):
+            raise ValueError("version")
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
+    except _BROKEN:
+        raise PlaygroundError(f"{what} is not a numpy array file, or it is cut off") from None
+    if dtype.hasobject:
+        raise PlaygroundError(f"{what} holds Python objects (pickle), which are never read; save plain numbers")
+    header = Header(tuple(int(n) for n in shape), dtype, bool(fortran))
+    if dtype.kind not in "fiubU" or any(n < 0 for n in header.shape):
+        raise PlaygroundError(f"{what} holds values of type {dtype.str[:20]!r}; plain numbers are accepted")
+    if header.size > MAX_BYTES:
+        raise PlaygroundError(
+            f"{what} declares {header.size / 1e6:,.0f} MB of values; at most {MAX_BYTES / 1e6:,.0f} MB are accepted"
+        )
+    return header
+
+
+def read_values(stream: IO[bytes], header: Header, what: str) -> NDArray[Any]:
+    """The values behind a header. PlaygroundError if the stream ends early."""
+    try:
+        data = stream.read(header.size) if header.size else b""
+    except _BAD_ZIP:
+        raise PlaygroundError(f"{what} is damaged and cannot be unpacked") from None
+    if len(data) != header.size:
+        raise PlaygroundError(f"{what} is cut off: {header.size:,} bytes are declared and {len(data):,} are there")
+    if not header.size:
+        return np.zeros(header.shape, header.dtype)
+    flat = np.frombuffer(data, header.dtype)
+    return flat.reshape(header.shape, order="F" if header.fortran else "C")
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """The arrays of one file: headers first, values when asked for."""
+
+    headers: dict[str, Header]
+    values: Callable[[str], NDArray[Any]]
+
+
+def _open_npy(data: bytes) -> Arrays:
+    header = read_header(io.BytesIO(data), "the npy file")
+
+    def values(name: str) -> NDArray[Any]:
+        stream = io.BytesIO(data)
+        return read_values(stream, read_header(stream, "the npy file"), "the npy file")
+
+    return Arrays({"": header}, values)
+
+
+def _check_directory(data: bytes) -> None:
+    """PlaygroundError unless the zip directory at the end is small; it is read in one piece later."""
+    at = data.rfind(b"PK\x05\x06", max(0, len(data) - 65_557))
+    if at < 0 or at + 22 > len(data):
+        raise PlaygroundError("the npz file is no zip archive, or it is cut off")
+    count, size = struct.unpack("<HI", data[at + 10 : at + 16])
+    if b"PK\x06\x07" in data[max(0, at - 20) : at] or count > MAX_MEMBERS or size > MAX_MEMBERS * 1024:
+        raise PlaygroundError(f"the npz file holds more than {MAX_MEMBERS} arrays")
+
+
+def _open_npz(data: bytes) -> Arrays:
+    _check_directory(data)
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist() if not info.is_dir()}
+    except _BAD_ZIP:
+        raise PlaygroundError("the npz file is no zip archive, or it is cut off") from None
+
+    def opened(name: str) -> tuple[IO[bytes], Header]:
+        info, what = members[name], f"the array '{name[:40]}' of the npz file"
+        if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise PlaygroundError(f"{what} is encrypted or packed in an unusual way; save it with numpy.savez")
+        try:
+            stream = archive.open(info)
+        except _BAD_ZIP:
+            raise PlaygroundError(f"{what} is damaged and cannot be unpacked") from None
+        try:
+            return stream, read_header(stream, what)
+        except (zipfile.BadZipFile, zlib.error):
+            raise PlaygroundError(f"{what} is damaged and cannot be unpacked") from None
+
+    headers: dict[str, Header] = {}
+    for name, info in members.items():
+        if info.filename.endswith(".npy"):
+            stream, headers[name] = opened(name)
+            stream.close()
+    if not headers:
+        raise PlaygroundError("the npz file holds no arrays")
+
+    def values(name: str) -> NDArray[Any]:
+        stream, header = opened(name)
+        return read_values(stream, header, f"the array '{name[:40]}' of the npz file")
+
+    return Arrays(headers, values)
+
+
+def open_arrays(path: Path) -> Arrays:
+    """The arrays of an npy (named "") or npz file. PlaygroundError unless it is a sound file within limits."""
+    data = path.read_bytes()
+    return _open_npz(data) if data[:2] == b"PK" or path.suffix.lower() == ".npz" else _open_npy(data)
