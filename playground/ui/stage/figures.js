@@ -3,13 +3,14 @@
 import { css, mix, readable, systemColour } from "./colour.js";
 import { project } from "./camera.js";
 import { clear, el } from "./dom.js";
-import { findContacts, paintContacts, paintGrid, paintShadow, paintTrail } from "./floor.js";
+import { findContacts, paintContacts, paintFade, paintGrid, paintShadow, paintTrail } from "./floor.js";
 import { guidedJoints } from "./guidance.js";
 import { Painter, tonesOf } from "./paint.js";
 import { createBody } from "./skeleton.js";
 
 const WORDS = 44; // pixels under the figures that belong to their names
 const AIR = 10; // pixels above them
+const CROWD = 4; // figures from which on a narrow picture gets two rows
 const SMOOTH = 10; // frames on either side over which the followed point is averaged
 const REACHING = [ // joints that a body reaches farthest with
   "pelvis", "head", "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_knee", "r_knee",
@@ -19,7 +20,7 @@ const REACHING = [ // joints that a body reaches farthest with
 export class Figures {
   constructor(canvas, labels, store, camera) {
     Object.assign(this, { canvas, labels, store, camera });
-    Object.assign(this, { data: null, figures: [], theme: null, ratio: 1, spacing: 1.2 });
+    Object.assign(this, { data: null, figures: [], theme: null, ratio: 1, spacing: 1.2, rows: 1, across: 1 });
     this.ctx = canvas.getContext("2d", { alpha: false });
     this.layer = document.createElement("canvas"); // where a figure is painted that is to be seen through
   }
@@ -92,13 +93,16 @@ export class Figures {
     this.ratio = ratio;
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
-    this.camera.resize(width, height, AIR, WORDS);
+    const many = this.figures.length >= CROWD && this.store.state.layout === "lanes";
+    this.rows = many && width < 1.5 * height ? 2 : 1; // a phone shows many figures in two rows
+    this.across = Math.max(1, Math.ceil(this.figures.length / this.rows));
+    this.camera.resize(width, height / this.rows, AIR, WORDS);
   }
 
   // Lanes lie along the camera's right-hand direction, so figures stay side by side from every angle.
   laneOf(index) {
     if (this.store.state.layout === "overlay") return [0, 0];
-    const metres = (index - (this.figures.length - 1) / 2) * this.spacing;
+    const metres = ((index % this.across) - (this.across - 1) / 2) * this.spacing;
     return [this.camera.right[0] * metres, this.camera.right[2] * metres];
   }
 
@@ -115,8 +119,8 @@ export class Figures {
     }
     const least = Math.min(2, Math.max(0.85, 1.3 * half));
     const { width, height } = this.camera;
-    const room = (tall * width) / Math.max(1, height - AIR - WORDS) / this.figures.length;
-    return Math.max(least, Math.min(1.9, 0.8 * room));
+    const room = (tall * width) / Math.max(1, height - AIR - WORDS) / this.across;
+    return Math.max(least, Math.min(1.9, 0.95 * room));
   }
 
   // The point that the camera follows at a frame: the first figure's way, smoothed; the origin when it does not follow.
@@ -192,12 +196,24 @@ export class Figures {
     camera.place();
     ctx.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     ctx.fillStyle = css(theme.surface);
-    ctx.fillRect(0, 0, camera.width, camera.height);
-    paintGrid(ctx, camera, theme);
+    ctx.fillRect(0, 0, camera.width, camera.height * this.rows);
     const lanes = this.figures.map((_, index) => this.laneOf(index));
-    this.figures.forEach((figure, index) => this.drawGround(figure, lanes[index], frame));
-    this.figures.forEach((figure, index) => this.drawFigure(figure, lanes[index], frame));
+    for (let row = 0; row < this.rows; row++) this.drawRow(row * this.across, lanes, frame, row * camera.height);
     this.placeLabels(lanes, frame);
+  }
+
+  drawRow(first, lanes, frame, top) {
+    const { ctx, camera, across } = this, shown = this.figures.slice(first, first + across);
+    ctx.save();
+    ctx.translate(0, top);
+    ctx.beginPath();
+    ctx.rect(0, 0, camera.width, camera.height);
+    ctx.clip();
+    paintGrid(ctx, camera, this.theme);
+    shown.forEach((figure, index) => this.drawGround(figure, lanes[first + index], frame));
+    paintFade(ctx, camera, this.theme, WORDS);
+    shown.forEach((figure, index) => this.drawFigure(figure, lanes[first + index], frame));
+    ctx.restore();
   }
 
   drawGround(figure, [dx, dz], frame) {
@@ -227,10 +243,11 @@ export class Figures {
 
   // Paints the projected body as one see-through shape, without its inside showing.
   paintThrough(figure, alpha) {
-    const { canvas, layer, ctx, ratio } = this;
+    const { canvas, layer, ctx } = this;
     if (layer.width !== canvas.width) layer.width = canvas.width; // setting a size clears and costs
     if (layer.height !== canvas.height) layer.height = canvas.height;
-    const over = clear(layer, ratio);
+    const over = clear(layer, 1);
+    over.setTransform(ctx.getTransform());
     this.painter.paint(over, this.screen, this.camera.focal, figure.tones);
     ctx.save();
     ctx.setTransform(1, 0, 0, 1, 0, 0);
@@ -240,10 +257,10 @@ export class Figures {
   }
 
   placeLabels(lanes, frame) {
-    const { camera, figures } = this, point = [0, 0, 0], room = camera.width / figures.length;
+    const { camera, figures, across } = this, point = [0, 0, 0], room = camera.width / across;
     const { follow, layout } = this.store.state;
     figures.forEach((figure, index) => {
-      let x = camera.width / 2 + (index - (figures.length - 1) / 2) * Math.min(room, 140);
+      let x = camera.width / 2 + (index - (across - 1) / 2) * Math.min(room, 140);
       if (layout !== "overlay") {
         const t = Math.min(Math.floor(frame), figure.frames - 1);
         const [cx, cz] = follow ? [camera.target[0], camera.target[2]] : figure.centre.subarray(2 * t, 2 * t + 2);
@@ -251,9 +268,11 @@ export class Figures {
         x = point[0];
       }
       x = Math.round(Math.min(Math.max(x, 40), camera.width - 40));
-      if (figure.labelAt === x && figure.labelRoom === room) return;
-      Object.assign(figure, { labelAt: x, labelRoom: room });
-      figure.label.style.transform = `translateX(${x}px) translateX(-50%)`;
+      const y = Math.round((Math.floor(index / across) + 1) * camera.height - WORDS + 2);
+      const place = `translate(${x}px, ${y}px) translateX(-50%)`;
+      if (figure.labelAt === place) return;
+      figure.labelAt = place;
+      figure.label.style.transform = place;
       figure.label.style.maxWidth = `${Math.max(room - 8, 56)}px`;
     });
   }

@@ -40,6 +40,16 @@ export function paintGrid(ctx, camera, theme) {
   });
 }
 
+// Lets the floor fade out where words stand: over the lowest `height` pixels.
+export function paintFade(ctx, camera, theme, height) {
+  const top = camera.height - height;
+  const fade = ctx.createLinearGradient(0, top, 0, top + 16);
+  fade.addColorStop(0, css(theme.surface, 0));
+  fade.addColorStop(1, css(theme.surface));
+  ctx.fillStyle = fade;
+  ctx.fillRect(0, top, camera.width, height);
+}
+
 // Runs `paint` with the canvas in metres on the floor round (x, z): right is along X, down along Z.
 export function onFloor(ctx, camera, x, z, paint) {
   project(camera, x, 0, z, spot, 0);

@@ -4,6 +4,10 @@ import { el } from "./dom.js";
 
 const EMPTY = "Choose a motion or type a prompt. The figure and its tokens appear here.";
 
+function told(seconds) {
+  return seconds < 0.1 ? `${Math.max(1, Math.round(1000 * seconds))} ms` : `${Number(seconds.toPrecision(2))} s`;
+}
+
 export class Notices {
   constructor(empty = EMPTY) {
     this.empty = empty;
@@ -17,8 +21,7 @@ export class Notices {
   showBadge(badge) {
     this.badge.hidden = !badge;
     if (!badge) return;
-    const time = badge.seconds === null || badge.seconds === undefined ? "" : `, ${badge.seconds.toPrecision(2)} s`;
-    this.badge.textContent = `${badge.kind}${time}`;
+    this.badge.textContent = badge.seconds === null ? badge.kind : `${badge.kind}, ${told(badge.seconds)}`;
     this.badge.dataset.kind = badge.kind;
     this.badge.title = badge.text || (badge.kind === "live" ? "Computed just now" : "A stored result");
   }
