@@ -94,7 +94,7 @@ def squat(draft: Draft) -> None:
     """Knee bends; factors repetitions, depth (metres)."""
     draft.draw_style()
     count = int(draft.choice("repetitions", (1, 2, 3, 4), (4, 3, 2, 1)))
-    depth = draft.value("depth", 0.28, 0.52)
+    depth = draft.value("depth", 0.32, 0.6)
     start, beat = draft.draw(0.2, 0.5), draft.draw(1.6, 2.2) * draft.tempo
     draft.stand(max(start + count * beat + draft.draw(0.1, 0.4), SHORTEST))
     stop = start + count * beat

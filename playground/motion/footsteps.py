@@ -73,7 +73,7 @@ def cadence(speed: float, kind: str) -> float:
 def stance_share(speed: Array, running: Array) -> Array:
     """Part of a stride that a foot is on the ground: about 0.62 walking, down to 0.28 in a fast run; running 0..1."""
     walk = 0.65 - 0.03 * np.minimum(speed, 1.5)
-    return np.asarray(walk + running * (0.63 - 0.35 * ease((speed - 1.0) / 2.2) - walk))
+    return np.asarray(walk + running * (0.63 - 0.35 * ease((speed - 0.8) / 2.0) - walk))
 
 
 class Path:

@@ -92,10 +92,10 @@ def squat(pose: Pose, t: Array, start: float, stop: float, times: int, depth: fl
     down = keyed(t, keys)
     forward, _ = forward_left(pose.pelvis[:, 0])
     pose.root[:, 1] -= depth * down
-    pose.root -= 0.32 * depth * down[:, None] * forward
-    pose.pelvis[:, 1] += 0.75 * depth * down
-    pose.spine[:, 1] += 0.8 * depth * down
-    pose.head[:, 1] -= 0.9 * depth * down
+    pose.root -= 0.3 * depth * down[:, None] * forward
+    pose.pelvis[:, 1] += 0.7 * depth * down
+    pose.spine[:, 1] += 0.75 * depth * down
+    pose.head[:, 1] -= 0.85 * depth * down
     pose.splay += 0.5 * depth * down[:, None]
     for side in (0, 1):
         pose.arm[:, side] += down[:, None] * (np.array([0.15, 1.45, -0.3, 0.25]) - pose.arm[:, side])
@@ -136,10 +136,11 @@ def kick(pose: Pose, t: Array, start: float, stop: float, side: int, times: int,
     ankle, foot = np.zeros((len(t), 3)), np.zeros(len(t))  # forwards, outwards, up
     swing = np.zeros(len(t))
     weight = window(t, start - 0.35, stop + 0.2, 0.4)
+    reach = 0.9 * float(np.sqrt(max(0.8**2 - (0.86 - height) ** 2, 0.0)))  # forwards, with the leg almost stretched
     for number in range(times):
         at = lambda share, begin=start + number * beat: begin + share * beat  # noqa: E731
         path = [(at(0.0), (0, 0, 0)), (at(0.3), (-0.24, 0, 0.22)), (at(0.42), (0.12, 0, 0.30)),
-                (at(0.56), (0.30 + 0.32 * min(height, 1.0), 0, height)), (at(0.74), (0.22, 0, 0.28)),
+                (at(0.56), (reach, 0, height)), (at(0.74), (0.22, 0, 0.28)),
                 (at(0.98), (0, 0, 0))]  # fmt: skip
         ankle += _through(t, path)
         up = -0.35 + 0.5 * height

@@ -35,7 +35,7 @@ def run(draft: Draft) -> None:
     """Straight ahead, with flight between the steps; factors speed, travel_seconds."""
     draft.draw_style(("neutral", "energetic", "tired"))
     draft.draw_ends()
-    speed = draft.value("speed", 2.0, 3.8)
+    speed = draft.value("speed", 2.1, 3.8)
     draft.trip(Stretch("run", draft.value("travel_seconds", 2.0, 4.0), speed))
     verb = "jog" if speed < 2.5 else "sprint" if speed > 3.5 else "run"
     word = "slowly" if speed < 2.5 else "fast" if speed > 3.2 else ""
