@@ -3,19 +3,18 @@
 import json
 import os
 import sys
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from playground.data.library import Library
+from playground.engine import Engine, default_engine
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
+from playground.motion.formats import read_motion, write_motion
 from playground.motion.motion import Motion
 from playground.progress import Progress
-
-if TYPE_CHECKING:
-    from playground.engine import Engine
-    from playground.tokenizers.token_file import TokenFile
+from playground.text.prompts import normalise
+from playground.tokenizers.token_file import TokenFile
 
 CLIP_FILES = (".bvh", ".npy", ".npz")
 FACTS = ("name", "tokenizer", "generator", "text", "parameters", "data", "checkpoint")
@@ -36,7 +35,7 @@ def app(host: str, port: int) -> None:
 
 def systems(as_json: bool) -> None:
     """Print the table of systems."""
-    rows = [{key: getattr(system, key) for key in FACTS} for system in _engine().systems()]
+    rows = [{key: getattr(system, key) for key in FACTS} for system in default_engine().systems()]
     if as_json:
         say(_json(rows))
         return
@@ -48,14 +47,14 @@ def systems(as_json: bool) -> None:
 
 def tokenize(clip: str, caption: str | None, system: str, start: float, library: Path | None, to: Path | None) -> None:
     """Motion to token file."""
-    if caption is not None:
-        _check_text(caption, "caption")
-    engine = _engine()
+    engine = default_engine()
     _check_system(engine, system)
+    if caption is not None:
+        caption = normalise(caption, what="caption", allow_empty=True)
     motion, notes = find_clip(clip, start, library, engine)
     with Progress(f"tokenizing with {system}"):
         tokenized = engine.tokenize(motion, motion.caption if caption is None else caption, system)
-    _write_text(_token_file(tokenized, tokenized.caption, tokenized.motion.frames).to_json(), to)
+    _write_text(tokenized.token_file().to_json(), to)
     if to:
         for note in notes:
             say(note)
@@ -65,17 +64,20 @@ def tokenize(clip: str, caption: str | None, system: str, start: float, library:
 
 def decode(tokens: Path, caption: str | None, guidance: float, out: Path) -> None:
     """Token file to motion file."""
-    if caption is not None:
-        _check_text(caption, "caption")
-    _check_guidance(guidance)
-    from playground.tokenizers.token_file import TokenFile
-
+    engine = default_engine()
     file = TokenFile.read(tokens)
-    engine = _engine()
     _check_system(engine, file.system)
+    if caption is not None:
+        caption = normalise(caption, what="caption", allow_empty=True)
+    given, expected = [(level.size, level.codes) for level in file.levels], engine.scales(file.system)
+    if given != expected:
+        raise PlaygroundError(
+            f"{tokens} does not fit {file.system}, which has {len(expected)} levels of "
+            f"{', '.join(str(size) for size, _ in expected)} tokens"
+        )
     with Progress(f"decoding with {file.system}"):
         decoded = engine.decode(file, caption=caption, guidance=guidance)
-    _write_motion(replace(decoded.motion, caption=file.caption if caption is None else caption), out)
+    _write_motion(decoded.motion, out)
 
 
 def generate(
@@ -93,20 +95,13 @@ def generate(
         raise PlaygroundError("a prompt and --no-text were both given; choose one")
     if not no_text and prompt is None:
         raise PlaygroundError("a prompt is needed; --no-text generates without one")
-    if prompt is not None:
-        _check_text(prompt, "prompt", empty=False)
-    if not LIMITS.min_seconds <= seconds <= LIMITS.max_seconds:
-        raise PlaygroundError(f"--seconds is {seconds:g}; {LIMITS.min_seconds:g} to {LIMITS.max_seconds:g} is accepted")
-    if not 0 <= seed <= LIMITS.max_seed:
-        raise PlaygroundError(f"--seed must be a whole number from 0 to {LIMITS.max_seed}")
-    _check_guidance(guidance)
-    engine = _engine()
+    engine = default_engine()
     _check_system(engine, system, generator=True)
     with Progress(f"generating with {system}"):
         made = engine.generate(prompt, seconds, system, seed=seed, guidance=guidance)
-    _write_motion(replace(made.motion, caption=prompt or ""), out)
+    _write_motion(made.motion, out)
     if to:
-        _write_text(_token_file(made, prompt or "", made.motion.frames).to_json(), to)
+        _write_text(made.token_file().to_json(), to)
 
 
 def prepare(source: str, root: Path | None, out: Path) -> None:
@@ -130,13 +125,13 @@ def train(config: str, library: Path, out: Path, resume: bool, steps: int | None
 
 def evaluate(system: str, library: Path, split: str, to: Path | None) -> None:
     """Measure a system on a split."""
-    _check_system(_engine(), system)
+    _check_system(default_engine(), system)
     if not Library.open(library).split(split):
         raise PlaygroundError(f"the split {split} of {library} is empty")
     from playground.evaluation import run
 
-    with Progress(f"evaluating {system}"):
-        result = run.evaluate(system, library, split)
+    with Progress(f"evaluating {system}") as progress:
+        result = run.evaluate(system, library, split, progress)
     _write_text(_json(result) + "\n", to)
     if to:
         say(f"{to}: " + ", ".join(f"{key} {value:.1f}" for key, value in result.items() if isinstance(value, float)))
@@ -149,7 +144,7 @@ def bench(to: Path | None) -> None:
     module.run(to)
 
 
-def find_clip(clip: str, start: float, library: Path | None, engine: "Engine") -> tuple[Motion, list[str]]:
+def find_clip(clip: str, start: float, library: Path | None, engine: Engine) -> tuple[Motion, list[str]]:
     """The motion that CLIP names, from `start` seconds on, cut to what a tokenizer sees, and what was done to it.
 
     A file by its suffix; otherwise an id of the library given, or of the examples, or of the folder `library` that
@@ -159,8 +154,6 @@ def find_clip(clip: str, start: float, library: Path | None, engine: "Engine") -
         raise PlaygroundError(f"--start is {start:g}; 0 or more seconds are accepted")
     path = Path(clip)
     if path.suffix.lower() in CLIP_FILES or path.exists():
-        from playground.motion.formats import read_motion
-
         read = read_motion(path, start_seconds=start)
         motion, notes = read.motion, [read.mapping, *read.changes]
     else:
@@ -177,10 +170,11 @@ def find_clip(clip: str, start: float, library: Path | None, engine: "Engine") -
     return motion, notes
 
 
-def _stored_clip(clip: str, library: Path | None, engine: "Engine") -> Motion:
+def _stored_clip(clip: str, library: Path | None, engine: Engine) -> Motion:
     example = next((example for example in engine.examples() if example.id == clip), None)
     if example is not None and library is None:
-        return example.motion()
+        with Progress(f"decoding {clip}"):
+            return example.motion()
     folder = library or Path("library")
     if library is not None or (folder / "library.json").is_file():
         opened = Library.open(folder)
@@ -193,13 +187,7 @@ def _stored_clip(clip: str, library: Path | None, engine: "Engine") -> Motion:
     )
 
 
-def _engine() -> "Engine":
-    from playground.engine import default_engine
-
-    return default_engine()
-
-
-def _check_system(engine: "Engine", name: str, generator: bool = False) -> None:
+def _check_system(engine: Engine, name: str, generator: bool = False) -> None:
     """The same sentences as the engine's, before anything heavy is loaded."""
     table = {system.name: system for system in engine.systems()}
     if name not in table:
@@ -210,27 +198,7 @@ def _check_system(engine: "Engine", name: str, generator: bool = False) -> None:
         raise PlaygroundError(f"the system {name} has no generator; it can tokenize and decode only")
 
 
-def _check_text(text: str, what: str, empty: bool = True) -> None:
-    if not empty and not text.strip():
-        raise PlaygroundError(f"the {what} is empty; describe a motion, or use --no-text")
-    if len(text) > LIMITS.max_prompt_chars:
-        raise PlaygroundError(f"the {what} has {len(text)} characters; {LIMITS.max_prompt_chars} are accepted")
-
-
-def _check_guidance(guidance: float) -> None:
-    if not 0 <= guidance <= LIMITS.max_guidance:
-        raise PlaygroundError(f"--guidance is {guidance:g}; 0 to {LIMITS.max_guidance:g} is accepted")
-
-
-def _token_file(result: Any, caption: str, frames: int) -> "TokenFile":
-    from playground.tokenizers.token_file import TokenFile
-
-    return TokenFile(result.system, result.checkpoint, caption, frames, tuple(result.levels))
-
-
 def _write_motion(motion: Motion, out: Path) -> None:
-    from playground.motion.formats import write_motion
-
     out.parent.mkdir(parents=True, exist_ok=True)
     for change in write_motion(motion, out):
         say(change)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from playground.data.library import LibraryClip, write_library
 from playground.data.sources.base import Reading, SourceEntry
+from playground.data.sources.bvh import read_bvh_folder
 from playground.data.sources.deepmimic import read_deepmimic
 from playground.data.sources.humanml3d import read_humanml3d
 from playground.data.sources.joints_npz import read_joints_npz
@@ -15,6 +16,7 @@ from playground.errors import PlaygroundError
 SOURCES: dict[str, SourceEntry] = {
     "joints-npz": SourceEntry(read_joints_npz, True, "a folder with motions.npz and clips.jsonl"),
     "humanml3d": SourceEntry(read_humanml3d, True, "HumanML3D as its authors publish it"),
+    "bvh": SourceEntry(read_bvh_folder, True, "a folder of .bvh files, with captions.csv if you have captions"),
     "deepmimic": SourceEntry(read_deepmimic, False, "the motions that an installed pybullet package carries"),
 }
 
