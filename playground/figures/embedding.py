@@ -99,7 +99,10 @@ def _name_groups(figure: go.Figure, points: NDArray[np.float64], actions: Sequen
 
 
 def _apart(places: list[tuple[str, NDArray[np.float64]]]) -> list[tuple[str, NDArray[np.float64]]]:
-    """Moves names up where two would overlap; places in shares of the map, a name taking 0.013 a letter by 0.05."""
+    """Moves names up where two would overlap, and drops those that would end up far from their place.
+
+    Places are in shares of the map; a name takes 0.013 a letter by 0.05.
+    """
     moved: list[tuple[str, NDArray[np.float64]]] = []
     for name, place in sorted(places, key=lambda entry: float(entry[1][1])):
         spot = place.copy()
@@ -107,7 +110,8 @@ def _apart(places: list[tuple[str, NDArray[np.float64]]]) -> list[tuple[str, NDA
             wide = 0.0065 * (len(name) + len(other)) + 0.01
             if abs(spot[0] - taken[0]) < wide and abs(spot[1] - taken[1]) < 0.05:
                 spot[1] = taken[1] + 0.05
-        moved.append((name, spot))
+        if spot[1] - place[1] <= 0.1:
+            moved.append((name, spot))
     return moved
 
 

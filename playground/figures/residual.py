@@ -45,4 +45,6 @@ def residual_bars(
         title="last scale kept, and its tokens", tickvals=list(range(levels + 1)), ticktext=ticks, ticks=""
     )
     figure.update_yaxes(title="energy of the latent left, %", range=[0, top * 1.12], rangemode="tozero", nticks=6)
+    if energy.count_ > 1:
+        caption = f"{caption}. Whiskers: 10th to 90th percentile over {energy.count_} motions.".lstrip(". ")
     return finish(figure, title=title, caption=caption, height=height, tick_lines=2)
