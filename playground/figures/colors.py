@@ -47,7 +47,7 @@ FAMILIES: dict[str, SystemColor] = {
     "momask++": SystemColor("#d55e00", "#f0843c"),
     "mogo": SystemColor("#009e73", "#2fc296"),
     "t2mgpt": SystemColor("#cc79a7", "#e09cc2"),
-    "mdm": SystemColor("#a3860a", "#d9bf45"),
+    "mdm": SystemColor("#a3860a", "#b0a040"),
 }
 _VARIANT_STEPS = {"mid": 1, "mini": 2, "tiny": 3, "notext": 1, "withouttext": 1, "nolanguage": 1, "casim": 1}
 _STEP_LIGHTNESS = (0.0, 0.11, -0.11, 0.18)
