@@ -40,7 +40,7 @@ def build(engine: EngineSource = _default_engine) -> gr.Blocks:
     services = Services(engine)
     with gr.Blocks(title=TITLE, delete_cache=(UPLOADS_CHECKED_EVERY, UPLOADS_KEPT), fill_width=True) as page:
         gr.HTML(_header(), elem_id="mtp-header", apply_default_css=False, js_on_load="window.mtpHeader?.(element);")
-        with gr.Tabs(elem_id="mtp-rooms"):
+        with gr.Tabs(elem_id="mtp-rooms", overflow_behavior="wrap"):
             for label, room in ROOMS.items():
                 name = label.lower().replace(" ", "-")
                 with gr.Tab(label, id=name, elem_id=f"room-{name}"):

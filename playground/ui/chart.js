@@ -3,7 +3,7 @@
  * Plotly itself is served by the playground and loaded once, after the page stands. A trace may carry
  * meta.dark = {"marker.color": ...} with what changes in the dark; every other colour comes from the --mtp tokens.
  * A click on a point that has customdata triggers 'pick' and rings that point in every panel of the chart; the figure's
- * layout.meta.picked names the point that is ringed at first.
+ * layout.meta.picked names the point that is ringed at first; an event 'mtp-pick' {chart: element id, id} rings another.
  */
 (() => {
   if (window.mtpChart) return;
@@ -102,6 +102,11 @@
 
     const redraw = () => draw().catch((error) => { box.textContent = error.message; });
     watch('value', () => { picked = null; redraw(); });
+    document.addEventListener('mtp-pick', (event) => {
+      if (!element.closest(`#${CSS.escape(event.detail.chart)}`)) return;
+      picked = event.detail.id;
+      redraw();
+    });
     let width = 0;
     new ResizeObserver(() => {
       if (box.clientWidth === width) return;

@@ -101,19 +101,21 @@ def attach(
     *,
     stage: str = "",
     doing: str = "Working",
+    model: bool = True,
     trigger_mode: Literal["once", "multiple", "always_last"] = "once",
     cancels: Any = None,
 ) -> Any:
-    """Bind `handler` to a Gradio event such as `button.click`, guarded, in the one model slot. Returns the dependency.
+    """Bind `handler` to a Gradio event such as `button.click`, guarded. Returns the dependency.
 
     stage: name of the stage that is dimmed under a progress line while the handler runs, with `doing` written on it.
+    model: whether it waits for the model slot; what only picks among stored results does not.
     """
     run = event(
         fn=guarded(handler, len(outputs)),
         inputs=list(inputs),
         outputs=[message, *outputs],
-        concurrency_id=MODEL_SLOT,
-        concurrency_limit=1,
+        concurrency_id=MODEL_SLOT if model else None,
+        concurrency_limit=1 if model else None,
         api_visibility="private",
         show_progress="hidden",
         trigger_mode=trigger_mode,

@@ -70,7 +70,7 @@ def _cell(fact: Fact) -> str:
     label = html.escape(fact.label)
     if fact.card:
         label = f'<span class="mtp-term" tabindex="0" data-card="{html.escape(fact.card, quote=True)}">{label}</span>'
-    return f'<div class="mtp-fact"><dd>{html.escape(fact.value)}</dd><dt>{label}</dt></div>'
+    return f'<div class="mtp-fact"><dd>{html.escape(fact.value)}</dd> <dt>{label}</dt></div>'
 
 
 def table(header: list[str], rows: list[list[str]], caption: str) -> str:

@@ -51,6 +51,14 @@ def tokenized_scene(
     return scene.payload([original, rebuilt], [track])
 
 
+def clip_scene(
+    system: "SystemInfo", motion: Motion, levels: Sequence[Any], palettes: Sequence[Any] | None, name: str, note: str
+) -> Json:
+    """One motion decoded from stored tokens; `note` says so under its name."""
+    shown = scene.figure("clip", name.capitalize(), motion.joints, system.name, note)
+    return scene.payload([shown], [score(system, motion.frames, levels, palettes)])
+
+
 def generated_scene(
     system: "SystemInfo", motion: Motion, levels: Sequence[Any], entropy: Sequence[Any], palettes: Sequence[Any] | None,
     sizes: Sequence[tuple[int, int]],

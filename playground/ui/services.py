@@ -1,14 +1,20 @@
 """What every room is handed: the engine, opened once and late, and what is known without it."""
 
+import hashlib
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from playground.analysis.bundle import Bundle, read_bundle
 from playground.errors import PlaygroundError
-from playground.figures.stage import code_colors
+from playground.figures.stage import code_colors, message
 from playground.motion.motion import Motion
+from playground.systems import checkpoint_path, header
+from playground.ui.view import View, read_view
 
 if TYPE_CHECKING:
     from playground.engine import Engine, Example, SystemInfo
@@ -22,6 +28,7 @@ class Services:
 
     def __init__(self, engine: EngineSource) -> None:
         self._source = engine
+        self._bundles: dict[str, Bundle] = {}
         self._palettes: dict[str, list[NDArray[np.uint8]]] = {}
 
     def engine(self) -> "Engine":
@@ -63,6 +70,34 @@ class Services:
     def scales(self, system: str) -> list[tuple[int, int]]:
         """(tokens, codes) of every scale of a system."""
         return [(int(size), int(codes)) for size, codes in self.engine().scales(system)]
+
+    def opening_path(self, name: str) -> Path:
+        """Where the stored first result of a room lies."""
+        return self.engine().assets / "opening" / f"{name}.json"
+
+    def fingerprint(self) -> str:
+        """Which checkpoints and which analysis stored results must come from to be shown; read from headers alone."""
+        assets, mark = self.engine().assets, hashlib.sha256()
+        for system in self.engine().systems():
+            heads = [header(checkpoint_path(assets, system.name, part)) for part in ("tokenizer", "generator")]
+            mark.update(json.dumps([system.name, heads], sort_keys=True).encode())
+        return mark.hexdigest()[:16]
+
+    def first_view(self, name: str, compute: Callable[["Services"], View]) -> View:
+        """The stored first result of a room, or one computed now; an empty stage with one sentence without either."""
+        found = read_view(self.opening_path(name), self.fingerprint())
+        if found is not None:
+            return found
+        try:
+            return compute(self)
+        except PlaygroundError as error:
+            return View(stage=message("empty", str(error)))
+
+    def bundle(self, system: str) -> Bundle:
+        """The stored analysis of a system, read once; PlaygroundError if it is not there."""
+        if system not in self._bundles:
+            self._bundles[system] = read_bundle(self.engine().assets / "analysis", system)
+        return self._bundles[system]
 
     def default_system(self) -> "SystemInfo":
         """The first system with a shipped checkpoint; PlaygroundError if none is shipped."""

@@ -1,16 +1,12 @@
 """What a room shows for one result. Stored and live results are the same thing and take the same path to the screen."""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from playground.errors import PlaygroundError
 from playground.figures import stage as scene
 from playground.ui.facts import Fact, facts_line
-
-OPENING = Path(__file__).parents[2] / "assets" / "opening"
 
 
 @dataclass(frozen=True)
@@ -27,10 +23,11 @@ class View:
     controls: dict[str, Any] = field(default_factory=dict)
     kind: str = "live"
     seconds: float = 0.0
+    made_from: str = ""  # fingerprint of the checkpoints behind a stored view
 
-    def stored(self) -> "View":
+    def stored(self, made_from: str = "") -> "View":
         """The same result, marked as stored."""
-        return replace(self, kind="stored")
+        return replace(self, kind="stored", made_from=made_from)
 
     def stage_json(self) -> str:
         """The stage's value: the payload with the badge of this view."""
@@ -42,32 +39,18 @@ class View:
         """The line of numbers; the stage shows the badge."""
         return facts_line(self.facts)
 
-    def write(self, name: str, folder: Path = OPENING) -> Path:
-        """Store this view as `folder/name.json`; returns the path."""
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"{name}.json"
-        path.write_text(json.dumps(asdict(self.stored()), separators=(",", ":")) + "\n", encoding="utf-8")
-        return path
+    def write(self, path: Path) -> None:
+        """Store this view."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(asdict(self), separators=(",", ":")) + "\n", encoding="utf-8")
 
 
-def read_view(name: str, folder: Path = OPENING) -> View | None:
-    """The stored view of that name, or None where there is none or it was written by another version."""
-    path = folder / f"{name}.json"
+def read_view(path: Path, made_from: str = "") -> View | None:
+    """A stored view, or None where there is none, another version wrote it or it was made from other checkpoints."""
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
-        facts = tuple(Fact(**fact) for fact in values.pop("facts"))
-        view = View(facts=facts, **values)
+        view = View(facts=tuple(Fact(**fact) for fact in values.pop("facts")), **values)
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
-    return view if view.stage.get("version") == scene.VERSION else None
-
-
-def first_view(name: str, compute: Callable[[], View]) -> View:
-    """The stored opening result of a room, or one computed now; an empty stage with one sentence without either."""
-    found = read_view(name)
-    if found is not None:
-        return found
-    try:
-        return compute()
-    except PlaygroundError as error:
-        return View(stage=scene.message("empty", str(error)))
+    current = view.stage.get("version", scene.VERSION) == scene.VERSION and view.made_from == made_from
+    return view if current else None

@@ -4,15 +4,18 @@ It lets the rooms be tested without torch. What it "decodes" is the motion it wa
 scales are used, so that the error falls with every scale as the real one does.
 """
 
+import tempfile
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from playground.analysis.bundle import Bundle, BundleClip, counts_of, write_bundle
 from playground.engine import check_generation, prepare
 from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
@@ -21,7 +24,7 @@ from playground.motion.synthetic import corpus
 from playground.results import Decoded, Example, GenerationStep, GuidancePair, Tokenized
 from playground.systems import SystemInfo
 from playground.text.prompts import normalise
-from playground.tokenizers.token_file import LevelTokens
+from playground.tokenizers.token_file import LevelTokens, TokenFile
 
 SIZES = (1, 2, 3, 4, 6, 8, 12, 18, 26, 36)
 CODES = (128, 128, 192, 192, 256, 256, 320, 320, 384, 384)
@@ -41,12 +44,32 @@ def tokens(seed: int) -> tuple[LevelTokens, ...]:
     return tuple(LevelTokens(s, c, rng.integers(0, c, s)) for s, c in zip(SIZES, CODES, strict=True))
 
 
+@lru_cache(maxsize=1)
+def stored_analysis() -> Bundle:
+    """A map of 90 clips in three groups with random tokens."""
+    rng = np.random.default_rng(5)
+    groups = ["walk", "wave", "sit"] * 30
+    centres = {"walk": (0.0, 0.0), "wave": (6.0, 1.0), "sit": (2.0, 6.0)}
+    points = np.array([centres[group] for group in groups]) + rng.normal(size=(90, 2))
+    clips = tuple(BundleClip(f"c{n}", n, "take", group, f"a person does {group}", 80) for n, group in enumerate(groups))
+    ids = [np.minimum(rng.geometric(0.02, (90, size)), codes) - 1 for size, codes in zip(SIZES, CODES, strict=True)]
+    means = np.concatenate([points, rng.normal(size=(90, 6))], axis=1).astype(np.float32)
+    energy = np.tile(0.7 ** np.arange(len(SIZES) + 1), (90, 1)).astype(np.float32)
+    return Bundle(
+        "lgtok-lite", "fake00000000", "made up", "test", 0, 30.0, (0.4, 0.2), 0.7, 0.33, SIZES, CODES, {}, "", clips,
+        means, points.astype(np.float32), points[:, ::-1].astype(np.float32).copy(),
+        np.concatenate(ids, axis=1).astype(np.int16), counts_of(ids, CODES), energy, np.full(90, 40.0, np.float32),
+    )  # fmt: skip
+
+
 class FakeEngine:
     """What the rooms use of the engine. `pause` is called before every scale of a generation."""
 
     def __init__(self, pause: Callable[[], None] = lambda: None) -> None:
         self.pause = pause
         self.calls: list[str] = []
+        self.assets = Path(tempfile.mkdtemp(prefix="stand-in-"))
+        write_bundle(self.assets / "analysis", stored_analysis())
 
     def systems(self) -> list[SystemInfo]:
         facts: dict[str, Any] = {}
@@ -94,6 +117,12 @@ class FakeEngine:
         motion = _shaken(tokenized.motion, 0.3 * 0.75**used)
         error = mpjpe(tokenized.motion.joints, motion.joints)
         return Decoded(motion, _features(motion), error, guidance, used, 0.04)
+
+    def decode(self, file: TokenFile, caption: str | None = None, guidance: float = 0.0, scales: Any = None) -> Decoded:
+        self.calls.append("decode")
+        source = motions()[zlib.crc32(file.levels[0].ids.tobytes()) % len(motions())]
+        motion = replace(source, joints=np.resize(source.joints, (file.frames, 22, 3)))
+        return Decoded(motion, _features(motion), None, guidance, len(file.levels), 0.04)
 
     def generate_steps(
         self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, guidance: float = 2.0,

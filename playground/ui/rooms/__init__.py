@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
-from playground.ui.rooms import generate, guidance, tokenize
+from playground.ui.rooms import codebooks, embedding, generate, guidance, tokenize
 from playground.ui.services import Services
 
 ROOMS: dict[str, Callable[[Services], None]] = {
     "Tokenize": tokenize.room,
+    "Embedding map": embedding.room,
+    "Codebooks": codebooks.room,
     "Generate": generate.room,
     "Guidance": guidance.room,
 }

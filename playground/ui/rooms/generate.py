@@ -16,14 +16,15 @@ from playground.ui.layout import LEAVE_AFTER, panel, room_frame, stage_and_score
 from playground.ui.scenes import generated_scene, token_facts
 from playground.ui.services import Services
 from playground.ui.uploads import checked_number
-from playground.ui.view import View, first_view
+from playground.ui.view import View
 
+NAME = "generate"
 LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens with every one of them."
 PROMPTS = (
-    "a person walks forward and waves",
-    "someone jogs, then stops",
+    "a person walks forward",
+    "someone jogs",
     "a person turns left while walking",
-    "a person raises the right hand",
+    "a person waves with both hands",
 )
 ENTROPY_CARD = (
     "How undecided the generator was, on average over its tokens: at 0 bit one code was certain, at 3 bit it was like "
@@ -103,7 +104,7 @@ def opening_view(services: Services) -> View:
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
-    opening = first_view("generate", lambda: opening_view(services))
+    opening = services.first_view(NAME, opening_view)
     progress = gr.State(Progress(), time_to_live=LEAVE_AFTER)
     with room_frame("generate"):
         stage = stage_and_score("generate", opening)

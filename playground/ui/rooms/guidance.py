@@ -12,8 +12,9 @@ from playground.ui.scenes import guidance_scene, token_facts
 from playground.ui.services import Services
 from playground.ui.stage.component import stage_call
 from playground.ui.uploads import checked_number
-from playground.ui.view import View, first_view
+from playground.ui.view import View
 
+NAME = "guidance"
 LEAD = (
     "The same tokens are decoded twice, with the caption and without. g pushes the result away from the wordless one: "
     "drag it and watch the first figure; the others stay at 0 to 4."
@@ -48,7 +49,7 @@ def opening_view(services: Services) -> View:
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
-    opening = first_view("guidance", lambda: opening_view(services))
+    opening = services.first_view(NAME, opening_view)
     with room_frame("guidance"):
         stage = stage_and_score("guidance", opening)
         with panel("What g does", LEAD):

@@ -15,11 +15,12 @@ from playground.ui.layout import LEAVE_AFTER, panel, room_frame, stage_and_score
 from playground.ui.scenes import error_fact, token_facts, tokenized_scene
 from playground.ui.services import Services
 from playground.ui.uploads import SUFFIXES, Source, read_upload
-from playground.ui.view import View, first_view
+from playground.ui.view import View
 
 if TYPE_CHECKING:
     from playground.engine import Tokenized
 
+NAME = "tokenize"
 LEAD = (
     "Left, the motion. Below, the same motion as tokens: one row a scale, coarse on top. Right, what comes back from "
     "those tokens alone."
@@ -97,7 +98,7 @@ def opening_view(services: Services) -> View:
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
-    opening = first_view("tokenize", lambda: opening_view(services))
+    opening = services.first_view(NAME, opening_view)
     session = gr.State(Session(), time_to_live=LEAVE_AFTER)
     with room_frame("tokenize"):
         stage = stage_and_score("tokenize", opening)

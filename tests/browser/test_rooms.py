@@ -1,0 +1,188 @@
+"""The rooms as a visitor uses them, on the engine's stand-in: first sight, what controls do, what errors do."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.browser.conftest import Visit
+
+pytestmark = pytest.mark.browser
+Go = Callable[..., Visit]
+
+
+@pytest.fixture
+def seen(visit: Go, stand_in: str) -> Visit:
+    return visit(stand_in)
+
+
+def error_in(page: Page, room: str) -> Locator:
+    """The error sentence of a room."""
+    return page.locator(f"#{room}-message [role=alert]")
+
+
+def facts(page: Page, room: str) -> Locator:
+    return page.locator(f"#{room}-facts")
+
+
+def choose(page: Page, control: str, place: int) -> str:
+    """Pick the entry number `place` of a menu; returns what it says."""
+    page.locator(f"#{control} input").click()
+    entry = page.get_by_role("option").nth(place)
+    words = entry.inner_text().strip()
+    entry.click()
+    return words
+
+
+def figure_text(page: Page, room: str) -> str:
+    return page.locator(f"#{room}-stage .ms-labels").inner_text()
+
+
+def test_the_page_opens_with_a_finished_example(seen: Visit) -> None:
+    page = seen.page
+    expect(page.locator("#tokenize-stage .ms-labels")).to_contain_text("Original")
+    expect(page.locator("#tokenize-stage .ms-labels")).to_contain_text("MPJPE")
+    expect(page.locator("#tokenize-score .ms-heads")).to_contain_text("116 tokens in 10 scales")
+    expect(facts(page, "tokenize")).to_contain_text(re.compile(r"\d mm\s*MPJPE"))
+    expect(page.locator("#tokenize-energy .bars path")).to_have_count(11)
+
+
+def test_another_example_replaces_motion_caption_and_numbers(seen: Visit) -> None:
+    page = seen.page
+    before, caption = (
+        facts(page, "tokenize").inner_text(),
+        page.locator("#tokenize-caption textarea, #tokenize-caption input"),
+    )
+    was = caption.input_value()
+    choose(page, "tokenize-example", 2)
+    expect(caption).not_to_have_value(was)
+    expect(facts(page, "tokenize")).not_to_have_text(before)
+
+
+def test_fewer_scales_give_a_larger_error(seen: Visit) -> None:
+    page = seen.page
+    expect(facts(page, "tokenize")).to_contain_text("116 tokens")
+    slider = page.locator("#tokenize-scales input[type=range]")
+    full = millimetres(page)
+    slider.focus()
+    for _ in range(7):
+        slider.press("ArrowLeft")
+    expect(facts(page, "tokenize")).to_contain_text(re.compile(r"\b6 tokens"))
+    assert millimetres(page) > full
+
+
+def test_a_click_on_a_bar_stops_at_its_scale(seen: Visit) -> None:
+    page = seen.page
+    bars = page.locator("#tokenize-energy .bars path")
+    expect(bars).to_have_count(11)
+    page.locator("#tokenize-energy .plotly").scroll_into_view_if_needed()
+    bars.nth(2).click(force=True)
+    expect(facts(page, "tokenize")).to_contain_text(re.compile(r"\b3 tokens"))
+    expect(page.locator("#tokenize-scales input[type=number]")).to_have_value("2")
+
+
+def test_a_bvh_file_can_be_uploaded(seen: Visit, tmp_path: Path) -> None:
+    from playground.motion.formats import write_motion
+    from playground.motion.synthetic import corpus
+
+    path = tmp_path / "mine.bvh"
+    write_motion(corpus(1, seed=9)[0].motion, path)
+    page = seen.page
+    was = figure_text(page, "tokenize")
+    page.locator("#tokenize-upload").locator("xpath=..").locator("input[type=file]").set_input_files(path)
+    expect(page.locator("#tokenize-message")).to_contain_text("mine.bvh")
+    expect(page.locator("#tokenize-stage .ms-labels")).not_to_have_text(was)
+
+
+@pytest.mark.parametrize("name", ["binary.bvh", "pickled.npy", "bomb.npz", "short.npz", "empty.bvh", "notes.txt"])
+def test_a_bad_upload_gives_one_sentence_and_the_last_result_stays(seen: Visit, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    bad_file(path)
+    page = seen.page
+    before = facts(page, "tokenize").inner_text()
+    page.locator("#tokenize-upload").locator("xpath=..").locator("input[type=file]").set_input_files(path)
+    expect(error_in(page, "tokenize").or_(page.locator(".toast-body")).first).to_be_visible()
+    assert facts(page, "tokenize").inner_text() == before
+    expect(page.locator("#tokenize-stage .ms-labels")).to_contain_text("MPJPE")
+    choose(page, "tokenize-example", 1)
+    expect(facts(page, "tokenize")).not_to_have_text(before)
+
+
+def bad_file(path: Path) -> None:
+    if path.name == "pickled.npy":
+        np.save(path, np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    elif path.name == "bomb.npz":
+        np.savez_compressed(path, joints=np.zeros((40_000, 22, 3), np.float32))
+    elif path.name == "short.npz":
+        np.savez(path, joints=np.zeros((2, 22, 3), np.float32))
+    elif path.name == "empty.bvh":
+        path.write_bytes(b"")
+    else:
+        path.write_bytes(bytes(range(256)) * 20)
+
+
+def millimetres(page: Page) -> float:
+    found = re.search(r"([\d.]+)\s*mm", facts(page, "tokenize").inner_text())
+    assert found is not None
+    return float(found.group(1))
+
+
+@pytest.mark.parametrize("prompt", ["", " \n ", "word " * 2_000])
+def test_a_bad_prompt_gives_one_sentence_and_the_last_result_stays(seen: Visit, prompt: str) -> None:
+    page = seen.enter("Generate")
+    expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Generated")
+    before = facts(page, "generate").inner_text()
+    page.locator("#generate-prompt textarea").fill(prompt)
+    page.locator("#generate-go").click()
+    expect(error_in(page, "generate")).to_have_text(re.compile(r"^The prompt [^.]*\.?[^.]*$"))
+    assert facts(page, "generate").inner_text() == before
+    expect(page.locator("#generate-go")).to_be_enabled()
+
+
+def test_a_motion_appears_scale_by_scale(seen: Visit) -> None:
+    page = seen.enter("Generate")
+    expect(page.locator("#generate-score .ms-heads")).to_contain_text("116 tokens in 10 scales")
+    page.locator("#generate-prompt textarea").fill("a person sits down")
+    page.locator("#generate-go").click()
+    label = page.locator("#generate-stage .ms-labels")
+    for scale in (2, 5, 8):
+        expect(label).to_contain_text(f"scale {scale} of 10")
+    expect(page.locator("#generate-message")).to_contain_text("of 10")
+    expect(label).not_to_contain_text("of 10")
+    expect(facts(page, "generate")).to_contain_text("116 tokens")
+    expect(page.locator("#generate-stop")).to_be_disabled()
+
+
+def test_a_generation_can_be_stopped_and_keeps_what_it_has(seen: Visit) -> None:
+    page = seen.enter("Generate")
+    page.locator("#generate-go").click()
+    label = page.locator("#generate-stage .ms-labels")
+    expect(label).to_contain_text("scale 2 of 10")
+    page.locator("#generate-stop").click()
+    expect(page.locator("#generate-message")).to_contain_text(re.compile(r"Stopped.*after scale \d of 10"))
+    expect(page.locator("#generate-go")).to_be_enabled()
+    expect(label).to_contain_text("of 10")
+    page.locator("#generate-go").click()
+    expect(facts(page, "generate")).to_contain_text("116 tokens")
+
+
+def test_the_guidance_slider_moves_the_figure_and_asks_nobody(seen: Visit) -> None:
+    page = seen.enter("Guidance")
+    for words in ("g = 0", "g = 1", "g = 2", "g = 3", "g = 4"):
+        expect(page.locator("#guidance-stage .ms-labels")).to_contain_text(words)
+    joints = "() => Array.from(MotionStage.get('guidance').joints('live')).slice(0, 3000)"
+    page.wait_for_function("() => window.MotionStage?.get('guidance')?.joints('live')")
+    page.wait_for_load_state("networkidle")
+    before, mark = np.array(page.evaluate(joints)), len(seen.requests)
+    slider = page.locator("#guidance-g input[type=range]")
+    slider.focus()
+    for _ in range(20):
+        slider.press("ArrowRight")
+    page.wait_for_function("() => Math.abs(MotionStage.get('guidance').state.guidance - 3) < 1e-6")
+    page.wait_for_timeout(300)
+    moved = np.abs(np.array(page.evaluate(joints)) - before).max()
+    assert moved > 1e-3
+    assert seen.sent_since(mark) == []

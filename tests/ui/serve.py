@@ -1,0 +1,18 @@
+"""Serve the page on the engine's stand-in: python -m tests.ui.serve PORT [SECONDS_A_SCALE]. For the browser tests."""
+
+import sys
+import time
+
+from playground.ui.app import launch
+from tests.ui.double import FakeEngine
+
+
+def main() -> None:
+    """Every scale of a generation takes SECONDS_A_SCALE, so that a person, or a test, can see it grow."""
+    port, pause = int(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
+    engine = FakeEngine(pause=lambda: time.sleep(pause))
+    launch(port=port, engine=lambda: engine)
+
+
+if __name__ == "__main__":
+    main()
