@@ -44,6 +44,7 @@ class Memory:
     gate: Tensor | None = None
     null: Tensor | None = None
     null_rows: int = 0
+    rotations: tuple[Rotation, Rotation] | None = None  # rotary positions of the queries and of the states, if any
 
 
 def split_heads(x: Tensor, heads: int) -> Tensor:
@@ -103,9 +104,17 @@ class CrossAttention(nn.Module):
         key, value = self.key_value(states).chunk(2, dim=-1)
         return split_heads(key, self.heads), split_heads(value, self.heads)
 
-    def attend(self, x: Tensor, keys_values: tuple[Tensor, Tensor], mask: Tensor | None = None) -> Tensor:
+    def attend(
+        self,
+        x: Tensor,
+        keys_values: tuple[Tensor, Tensor],
+        mask: Tensor | None = None,
+        rotation: Rotation | None = None,
+    ) -> Tensor:
         """x [B, T, D] to prepared keys and values -> [B, T, D]."""
         query = split_heads(self.query(x), self.heads)
+        if rotation is not None:
+            query = apply_rope(query, rotation)
         return self.out(attend(query, *keys_values, mask, self.dropout if self.training else 0.0))
 
     def constant(self, vector: Tensor) -> Tensor:
@@ -116,10 +125,15 @@ class CrossAttention(nn.Module):
         """x [B, T, D] -> [B, T, D]; the last `memory.null_rows` rows of the batch see the null vector only."""
         live = x.shape[0] - memory.null_rows
         keys_values, mask = self.keys_values(memory.states), memory.mask
+        turn_query, turn_key = memory.rotations or (None, None)
+        if turn_key is not None:
+            keys_values = (apply_rope(keys_values[0], turn_key), keys_values[1])
         if live == 2 * memory.states.shape[0]:
             keys_values = (torch.cat([keys_values[0]] * 2), torch.cat([keys_values[1]] * 2))
             mask = None if mask is None else torch.cat([mask] * 2)
-        out = self.attend(x[:live], keys_values, mask)
+            if turn_query is not None:
+                turn_query = (torch.cat([turn_query[0]] * 2), torch.cat([turn_query[1]] * 2))
+        out = self.attend(x[:live], keys_values, mask, turn_query)
         if memory.null_rows and memory.null is not None:
             constant = self.constant(memory.null).expand(memory.null_rows, x.shape[1], -1)
             out = torch.cat([out, constant])

@@ -101,8 +101,8 @@ class Block(nn.Module):
 class UStack(nn.Module):
     """Entry norm, an odd number of blocks with U-shaped skips, exit norm.
 
-    The outputs of the first half wait on a stack; before each block of the second half the stream is joined with
-    the popped one and mapped back to the width by that block's own linear layer. ValueError for an even depth with skips.
+    The outputs of the first half wait on a stack; before each block of the second half the stream is joined with the
+    popped one and mapped back to the width by that block's own linear layer. ValueError for an even depth with skips.
     """
 
     def __init__(

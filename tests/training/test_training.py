@@ -29,10 +29,10 @@ CPU = Launch(accelerator="cpu", precision="32-true")
 
 @pytest.fixture
 def library(tmp_path) -> Path:
-    clips = [
-        LibraryClip(f"clip{n}", "AB"[n % 3 == 0], "val" if n == 5 else "train", "walk", ("walks left",), drifting(40 + n, n))
-        for n in range(8)
-    ]  # fmt: skip
+    clips = []
+    for n in range(8):
+        split, joints = ("val" if n == 5 else "train"), drifting(40 + n, n)
+        clips.append(LibraryClip(f"clip{n}", "AB"[n % 3 == 0], split, "walk", ("walks left",), joints))
     write_library(tmp_path / "library", clips, "tiny library")
     return tmp_path / "library"
 
