@@ -90,7 +90,10 @@ def _shipped() -> Iterator[Row]:
     answer = fresh("benchmarks.cases", "shipped")
     for what, seconds in answer["seconds"].items():
         yield Row(section, what, "s", seconds, GOALS.get(what))
-    yield Row(section, "peak memory", "MB", answer["peak"] / 1e6)
+    if answer["seconds"]:
+        yield Row(section, "peak memory", "MB", answer["peak"] / 1e6)
+    else:
+        _say("no checkpoint is shipped here; train one with the train command")
     yield Row(section, "page ready", "s", page_ready(), GOALS["page ready"], note="process start to answer of the page")
 
 
