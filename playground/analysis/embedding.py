@@ -1,6 +1,7 @@
 """Motions as points of a plane: t-SNE and PCA of dequantized embeddings (systems.md G1 Fig 6, I9)."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -97,13 +98,36 @@ def neighbour_agreement(embeddings: ArrayLike, labels: Sequence[str], k: int = 1
     what shuffled labels give on average. k is cut to n - 1; both nan if n < 2. A picture of t-SNE can flatter or hide
     groups; this number cannot.
     """
+    groups = agreement_by_label(embeddings, labels, k)
+    n = sum(group.count for group in groups)
+    if n < 2:
+        return float("nan"), float("nan")
+    return (
+        sum(group.count * group.agreement for group in groups) / n,
+        sum(group.count * group.chance for group in groups) / n,
+    )
+
+
+@dataclass(frozen=True)
+class LabelAgreement:
+    """How well the vectors of one label hold together."""
+
+    label: str
+    count: int
+    agreement: float  # mean share of a vector's nearest others that have its label
+    chance: float  # the same for shuffled labels
+
+
+def agreement_by_label(embeddings: ArrayLike, labels: Sequence[str], k: int = 10) -> list[LabelAgreement]:
+    """`neighbour_agreement` for the vectors of each label, the most frequent label first; nan where n < 2."""
     rows, names = np.asarray(embeddings, np.float64), np.asarray(labels)
     if rows.ndim != 2 or len(rows) != len(names):
         raise PlaygroundError(f"one label a vector is needed, got {len(names)} labels for {list(rows.shape)}")
     n = len(rows)
     if n < 2:
-        return float("nan"), float("nan")
-    k = min(k, n - 1)
-    near = NearestNeighbors(n_neighbors=k).fit(rows).kneighbors(return_distance=False)  # (n, k), others only
-    counts = np.unique(names, return_counts=True)[1].astype(np.float64)
-    return float(np.mean(names[near] == names[:, None])), float(np.sum(counts * (counts - 1)) / (n * (n - 1)))
+        return [LabelAgreement(str(name), 1, float("nan"), float("nan")) for name in names]
+    search = NearestNeighbors(n_neighbors=min(k, n - 1)).fit(rows)
+    same = (names[search.kneighbors(return_distance=False)] == names[:, None]).mean(axis=1)  # [n], others only
+    found = [(str(name), names == name) for name in np.unique(names)]
+    groups = [LabelAgreement(m, int(w.sum()), float(same[w].mean()), float((w.sum() - 1) / (n - 1))) for m, w in found]
+    return sorted(groups, key=lambda group: (-group.count, group.label))

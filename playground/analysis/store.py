@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from playground.analysis.bundle import DECODED_NOTE, Bundle, BundleClip, counts_of, write_bundle
+from playground.analysis.bundle import DECODED_NOTE, Bundle, BundleClip, counts_of, read_bundle, write_bundle
 from playground.analysis.embedding import EmbeddingMap, neighbour_agreement
 from playground.analysis.passes import ClipPass, clip_passes, first_caption
 from playground.analysis.phrases import group_of, sentence
 from playground.data.library import Library
-from playground.engine import Engine, default_engine
+from playground.engine import ASSETS, Engine, default_engine
 from playground.errors import PlaygroundError
 
 NOTE = (
@@ -77,6 +77,21 @@ def build_bundle(
         energy=np.stack([one.energy for one in passes]).astype(np.float32),
         errors_mm=np.array([one.errors_mm.mean() for one in passes], np.float32),
     )
+
+
+def analysis_of(
+    system: str,
+    *,
+    library: str | Path | None = None,
+    split: str = "test",
+    limit: int | None = None,
+    seed: int = 0,
+    folder: Path = ASSETS / "analysis",
+) -> Bundle:
+    """The stored analysis of a system, or with the path of a library one computed now on the clips of a split."""
+    if library is None:
+        return read_bundle(folder, system)
+    return build_bundle(system, Path(library), split, seed=seed, limit=limit)
 
 
 def _clip(library: Library, one: ClipPass) -> BundleClip:

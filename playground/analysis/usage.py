@@ -94,3 +94,8 @@ def _count(ids: ArrayLike, size: int, scale: int) -> NDArray[np.int64]:
     if flat.min() < 0 or flat.max() >= size:
         raise PlaygroundError(f"token ids of scale {scale} lie in 0 to {size - 1}; got {flat.min()} to {flat.max()}")
     return np.bincount(flat, minlength=size).astype(np.int64)
+
+
+def expected_used(total: int, codes: int) -> float:
+    """Share of a codebook that `total` tokens reach on average if every code is as likely as any other."""
+    return 1.0 - (1.0 - 1.0 / codes) ** int(total)

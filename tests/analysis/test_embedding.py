@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from playground.analysis.embedding import EmbeddingMap, motion_means, neighbour_agreement
+from playground.analysis.embedding import EmbeddingMap, agreement_by_label, motion_means, neighbour_agreement
 from playground.errors import PlaygroundError
 
 
@@ -81,6 +81,13 @@ def test_agreement_against_sorting_all_distances(n: int, k: int, seed: int) -> N
     agreement, chance = neighbour_agreement(rows, names, k)
     assert agreement == pytest.approx(np.mean(shares))
     assert chance == pytest.approx(np.mean(pairs))
+    groups = agreement_by_label(rows, names, k)
+    assert [group.count for group in groups] == sorted((group.count for group in groups), reverse=True)
+    for group in groups:
+        own = [i for i, name in enumerate(names) if name == group.label]
+        assert group.count == len(own)
+        assert group.agreement == pytest.approx(np.mean([shares[i] for i in own]))
+        assert group.chance == pytest.approx(np.mean([pairs[i] for i in own]))
 
 
 def test_agreement_of_a_single_vector_is_unknown() -> None:

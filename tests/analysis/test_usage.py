@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from playground.analysis.usage import CodeUsage, perplexity
+from playground.analysis.usage import CodeUsage, expected_used, perplexity
 from playground.errors import PlaygroundError
 
 SCALES = st.lists(
@@ -97,6 +97,13 @@ def test_ids_that_cannot_be_are_refused(ids: list[list[float]], codes: list[int]
 def test_counts_that_cannot_be_are_refused(counts: list) -> None:
     with pytest.raises(PlaygroundError):
         CodeUsage().fit_counts(counts)
+
+
+@pytest.mark.parametrize("total, codes", [(0, 5), (1, 1), (3, 4), (200, 10)])
+def test_what_even_use_would_reach(total: int, codes: int) -> None:
+    draws = np.random.default_rng(0).integers(0, codes, (20_000, total))
+    reached = np.mean([len(set(row)) / codes for row in draws.tolist()])
+    assert expected_used(total, codes) == pytest.approx(reached, abs=0.01)
 
 
 def test_unknown_order_and_negative_k_are_refused() -> None:
