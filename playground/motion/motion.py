@@ -28,7 +28,8 @@ class Motion:
         joints = np.ascontiguousarray(self.joints, dtype=np.float32)
         if joints.ndim != 3 or joints.shape[1:] != (self.skeleton.size, 3) or not len(joints):
             raise PlaygroundError(
-                f"a motion on {self.skeleton.name} needs joints [frames, {self.skeleton.size}, 3], got {list(joints.shape)}"
+                f"a motion on {self.skeleton.name} needs joints [frames, {self.skeleton.size}, 3],"
+                f" got {list(joints.shape)}"
             )
         if not np.isfinite(joints).all():
             raise PlaygroundError("the motion holds positions that are not finite numbers; every value must be finite")

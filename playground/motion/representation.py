@@ -1,7 +1,8 @@
 """Joints <-> the 67 columns of LG-Tok (systems.md A1), canonicalisation, mirroring, normalisation. No torch.
 
-Columns: 0 heading increment (half the yaw angle, rad/frame), 1-2 root velocity x and z in the character frame (m/frame),
-3 root height (m), 4-66 joints 1..21 relative to the root's x, z and heading (m). They are the first 67 of HumanML3D's 263.
+Columns: 0 heading increment (half the yaw angle, rad/frame), 1-2 root velocity x and z in the character frame
+(m/frame), 3 root height (m), 4-66 joints 1..21 relative to the root's x, z and heading (m). They are the first 67 of
+HumanML3D's 263.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,7 +24,7 @@ Array = NDArray[np.floating]
 
 
 def facing(joints: Array) -> NDArray[np.float64]:
-    """Horizontal facing direction [F, 3] of joints [F, 22, 3], not unit length: up x ((r_hip-l_hip)+(r_shoulder-l_shoulder))."""
+    """Horizontal unit facing [F, 3] of joints [F, 22, 3]: up x ((r_hip - l_hip) + (r_shoulder - l_shoulder))."""
     right_hip, left_hip, right_shoulder, left_shoulder = (joints[:, j].astype(np.float64) for j in ACROSS)
     across = right_hip - left_hip + right_shoulder - left_shoulder
     direction = np.stack([across[:, 2], np.zeros(len(across)), -across[:, 0]], axis=-1)
@@ -33,10 +34,10 @@ def facing(joints: Array) -> NDArray[np.float64]:
 
 def heading(joints: Array, smooth: bool = True) -> NDArray[np.float64]:
     """Yaw [F] in radians that turns each frame's facing direction to +Z; frame 0 is exactly 0 when smoothed (A1)."""
-    direction = facing(joints)
+    direction: Array = facing(joints)
     if smooth:
         direction = gaussian_filter1d(direction, HEADING_SIGMA, axis=0, mode="nearest", truncate=4.0)
-    yaw = -np.arctan2(direction[:, 0], direction[:, 2])
+    yaw = np.asarray(-np.arctan2(direction[:, 0], direction[:, 2]), np.float64)
     if smooth:
         yaw[0] = 0.0
     return yaw

@@ -58,5 +58,6 @@ HUMAN22 = Skeleton(
 )  # fmt: skip
 
 FEET = tuple(HUMAN22.index(name) for name in ("l_ankle", "l_foot", "r_ankle", "r_foot"))
-ACROSS = tuple(HUMAN22.index(name) for name in ("r_hip", "l_hip", "r_shoulder", "l_shoulder"))  # facing (A1): 2, 1, 17, 16
+# The joints that facing is read from (A1): 2, 1, 17, 16.
+ACROSS = tuple(HUMAN22.index(name) for name in ("r_hip", "l_hip", "r_shoulder", "l_shoulder"))
 CHAINS = ((0, 2, 5, 8, 11), (0, 1, 4, 7, 10), (0, 3, 6, 9, 12, 15), (9, 14, 17, 19, 21), (9, 13, 16, 18, 20))

@@ -23,9 +23,10 @@ def row(text: TextFeatures, index: int) -> TextFeatures:
     return TextFeatures(text.tokens[only, :count], text.mask[only, :count], text.pooled[only], text.words[only])
 
 
+@pytest.mark.parametrize("aligned", [False, True])
 @pytest.mark.parametrize("patch", [1, 4])
-def test_padding_changes_nothing(patch):
-    model, text = tiny_tokenizer(patch=patch), text_features((4, 2))
+def test_padding_changes_nothing(patch, aligned):
+    model, text = tiny_tokenizer(patch=patch, aligned=aligned), text_features((4, 2))
     x = motion()
     together = model.latents(x, LENGTHS, text)
     alone = model.latents(x[1:, :24], LENGTHS[1:], row(text, 1))
@@ -44,8 +45,9 @@ def test_padding_changes_nothing(patch):
     torch.testing.assert_close(model.decode(z, LENGTHS, longer), out, atol=1e-5, rtol=1e-4)
 
 
-def test_guidance_equals_two_plain_decodes():
-    model, text, z = tiny_tokenizer(), text_features((4, 2)), torch.randn(2, 6, 12)
+@pytest.mark.parametrize("aligned", [False, True])
+def test_guidance_equals_two_plain_decodes(aligned):
+    model, text, z = tiny_tokenizer(aligned=aligned), text_features((4, 2)), torch.randn(2, 6, 12)
     conditional, unconditional = model.decode(z, LENGTHS, text), model.decode(z, LENGTHS, None)
     assert (conditional - unconditional).abs().max() > 1e-2
     for g in (0.0, 0.5, 2.0, 6.0):
@@ -84,7 +86,20 @@ def test_edit_mask_of_ones_is_the_plain_decode_bit_for_bit(patch):
     assert torch.equal(*same)
 
 
+def test_aligned_latents_are_spread_evenly_over_each_motion():
+    """Latent t of T stands in the middle of the t-th of T equal parts of the motion; frames stand at 0, 1, 2, ..."""
+    places = tiny_tokenizer(aligned=True)._latent_places(LENGTHS)
+    for b, length in enumerate(LENGTHS.tolist()):
+        edges = [t * length / 6 - 0.5 for t in range(7)]
+        middles = [(first + last) / 2 for first, last in itertools.pairwise(edges)]
+        torch.testing.assert_close(places[b], torch.tensor(middles))
+    with pytest.raises(ValueError, match="rotary"):
+        tiny_tokenizer(aligned=True, positions="learned")
+
+
 SWITCHES = {
+    "aligned": [True],
+    "small_init": [False],
     "norm": ["layer"],
     "feed": ["gelu"],
     "skips": [False],
