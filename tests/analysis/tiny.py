@@ -3,18 +3,16 @@
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from playground.checkpoints import Card, save_checkpoint
 from playground.data.library import Library, LibraryClip, write_library
-from playground.generators.scalewise import GeneratorConfig, build_generator
 from playground.motion.representation import canonicalise
 from playground.text.encoders import load_encoder
 from playground.text.features import EncoderId
-from playground.tokenizers.transformer import TokenizerConfig, build_tokenizer
 from tests.conftest import drifting
+from tests.tiny import TINY, tiny_generator, tiny_tokenizer
 
-SCALES, CODES = (1, 3, 6), (8, 16, 24)
+SCALES, CODES = TINY.scales, TINY.codes
 SYSTEM = "lgtok-lite"
 PLAN = (  # source, split, action label, captions, poses
     ("A", "test", "walk|happy", ("someone walks to the left", "second"), 60),
@@ -52,31 +50,14 @@ def tiny_assets(folder: Path, library: Library) -> Path:
     """An assets folder with a randomly initialised tokenizer and generator of three scales under the name SYSTEM."""
     encoder = load_encoder("minilm")
     identity = EncoderId(encoder.name, encoder.width, encoder.hash)
-    with torch.random.fork_rng():
-        torch.manual_seed(0)
-        config = TokenizerConfig(
-            patch=4, width=16, depth=1, heads=2, hidden=16, dropout=0.0, scales=SCALES, codes=CODES, code_width=8,
-            phi="residual", text_width=384, pre_norm=True, skips=False,
-        )  # fmt: skip
-        tokenizer = build_tokenizer(config)
-        for book in tokenizer.quantizer.codebooks:
-            book.vectors.normal_()  # type: ignore[operator, union-attr]
-        draws = GeneratorConfig(
-            width=16,
-            depth=1,
-            heads=2,
-            hidden=16,
-            scales=SCALES,
-            codes=CODES,
-            code_width=8,
-            text_width=384,
-            text_mask=True,
-        )
-        generator = build_generator(draws)
+    tokenizer = tiny_tokenizer(max_frames=196, text_width=encoder.width)
+    generator = tiny_generator(text_width=encoder.width, lengths=49).transformer
     place = folder / "checkpoints" / SYSTEM
-    card = Card("tokenizer", config, identity, "tiny", {"step": 1}, library.normaliser)
+    card = Card("tokenizer", tokenizer.config, identity, "tiny", {"step": 1}, library.normaliser)
     save_checkpoint(place / "tokenizer.safetensors", tokenizer, card)
-    save_checkpoint(place / "generator.safetensors", generator, Card("generator", draws, identity, "tiny", {"step": 1}))
+    save_checkpoint(
+        place / "generator.safetensors", generator, Card("generator", generator.config, identity, "tiny", {"step": 1})
+    )
     return folder
 
 
