@@ -34,9 +34,8 @@ def facing(joints: Array) -> NDArray[np.float64]:
 
 def heading(joints: Array, smooth: bool = True) -> NDArray[np.float64]:
     """Yaw [F] in radians that turns each frame's facing direction to +Z; frame 0 is exactly 0 when smoothed (A1)."""
-    direction: Array = facing(joints)
-    if smooth:
-        direction = gaussian_filter1d(direction, HEADING_SIGMA, axis=0, mode="nearest", truncate=4.0)
+    raw = facing(joints)
+    direction = gaussian_filter1d(raw, HEADING_SIGMA, axis=0, mode="nearest", truncate=4.0) if smooth else raw
     yaw = np.asarray(-np.arctan2(direction[:, 0], direction[:, 2]), np.float64)
     if smooth:
         yaw[0] = 0.0
