@@ -44,8 +44,8 @@ def heading(joints: Array, smooth: bool = True) -> NDArray[np.float64]:
 
 def canonicalise(joints: Array) -> NDArray[np.float32]:
     """joints [F, 22, 3] -> float32 of the same shape: lowest joint at y=0, frame 0 over the origin, facing +Z."""
-    turned = np.asarray(joints, np.float64)
-    turned = qrotate(yaw_quaternion(heading(turned[:1], smooth=False))[0], turned)
+    turn = yaw_quaternion(heading(np.asarray(joints[:1]), smooth=False))[0]
+    turned = qrotate(turn, np.asarray(joints, np.float64))
     shift = np.array([turned[0, 0, 0], turned[..., 1].min(), turned[0, 0, 2]])
     return (turned - shift).astype(np.float32)
 
