@@ -38,13 +38,19 @@ def residual_bars(
     top = float(np.nanmax(high))
     for n, value in enumerate(energy.left_):
         figure.add_annotation(
-            x=n, y=max(high[n], left[n]), text=percent(value), showarrow=False, yanchor="bottom", yshift=2, font_size=11
+            x=n,
+            y=max(high[n], left[n]),
+            text=percent(value).removesuffix(" %"),
+            showarrow=False,
+            yanchor="bottom",
+            yshift=2,
+            font_size=11,
         )
     ticks = ["none", *(f"{n + 1}<br>{size}" for n, size in enumerate(sizes))]
     figure.update_xaxes(
         title="last scale kept, and its tokens", tickvals=list(range(levels + 1)), ticktext=ticks, ticks=""
     )
-    figure.update_yaxes(title="energy of the latent left, %", range=[0, top * 1.12], rangemode="tozero", nticks=6)
+    figure.update_yaxes(title="energy left, %", range=[0, top * 1.12], rangemode="tozero", nticks=6)
     if energy.count_ > 1:
         caption = f"{caption}. Whiskers: 10th to 90th percentile over {energy.count_} motions.".lstrip(". ")
     return finish(figure, title=title, caption=caption, height=height, tick_lines=2)

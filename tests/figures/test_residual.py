@@ -17,7 +17,7 @@ def test_bars_are_the_shares() -> None:
     assert np.subtract(bars.y, bars.error_y.arrayminus) == pytest.approx(100 * energy.low_, abs=1e-3)
     assert bars.error_y.visible and len(set(bars.marker.color)) == 3
     assert "removes 50 %" in bars.hovertext[1]
-    assert {"100 %", "50 %", "20 %"} <= {note.text for note in figure.layout.annotations}
+    assert {"100", "50", "20"} <= {note.text for note in figure.layout.annotations}
 
 
 def test_one_motion_has_no_whiskers() -> None:
