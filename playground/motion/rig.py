@@ -24,6 +24,7 @@ COLLAR, SHOULDER, ELBOW, WRIST = (13, 14), (16, 17), (18, 19), (20, 21)
 FLAT = -OFFSETS[list(FOOT), 1]  # height of the ankle [2] when the foot lies flat on the floor
 REACH = 0.997 * (LENGTHS[list(KNEE)] + LENGTHS[list(ANKLE)])  # longest hip to ankle distance [2] a pose may ask for
 HIP_DROP = -OFFSETS[list(HIP), 1].mean()
+STANDING = 0.955  # metres, height of the pelvis of somebody who stands with the knees a little bent
 ARM_AT_REST = np.array([0.22, 0.03, -0.25, 0.36])  # outwards, forwards, twist, elbow of a hanging arm
 
 
@@ -49,7 +50,7 @@ class Pose:
         pose.arm[:] = ARM_AT_REST
         pose.ankle[:, :, 0], pose.ankle[:, :, 1] = 0.09 * SIGN, FLAT
         pose.splay[:] = 0.12
-        pose.root[:, 1] = 0.948
+        pose.root[:, 1] = STANDING
         return pose
 
 

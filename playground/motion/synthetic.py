@@ -56,13 +56,13 @@ def synthesise(action: str, rng: np.random.Generator, **factors: Any) -> Synthet
         raise PlaygroundError(f"these factors make a motion longer than {LONGEST} seconds; ask for less of it")
     if draft.now < SHORTEST:
         draft.parts.append(Stretch("walk" if draft.after else "stand", SHORTEST - draft.now, draft.parts[-1].speed))
-    trip = travel(draft.parts, vary(draft.style, rng), rng, draft.before, draft.after)
-    t = np.arange(len(trip.pose.root)) / LIMITS.fps
+    pose = travel(draft.parts, vary(draft.style, rng), rng, draft.before, draft.after)
+    t = np.arange(len(pose.root)) / LIMITS.fps
     for overlay in draft.overlays:
-        overlay(trip.pose, t)
-    lower_to_reach(trip.pose)
+        overlay(pose, t)
+    lower_to_reach(pose)
     texts = captions(draft.clauses, draft.factors["style"], rng, int(rng.integers(3, 5)))
-    motion = Motion(canonicalise(joints_of(trip.pose)), caption=texts[0], name=action)
+    motion = Motion(canonicalise(joints_of(pose)), caption=texts[0], name=action)
     return Synthetic(motion, texts, draft.factors | {"seconds": motion.seconds}, action)
 
 
