@@ -49,12 +49,17 @@ class BatchConfig:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """features float32 [B, F, 67] normalised, zero beyond each length; lengths int64 [B]; one caption a motion."""
+    """features float32 [B, F, 67] normalised, zero beyond each length; lengths int64 [B]; one caption a motion.
+
+    mean_frames: real frames of the whole batch divided by the number of processes, so that sums over it, averaged over
+    processes, are means over the whole batch.
+    """
 
     features: NDArray[np.float32]
     lengths: NDArray[np.int64]
     captions: list[str]
     sources: list[str]
+    mean_frames: float
 
 
 def library_samples(library: Library, split: str) -> list[Sample]:
@@ -138,7 +143,9 @@ class BatchSource:
         cuts.sort(key=lambda cut: len(cut[0]))
         order = rng.permutation(c.bucket)
         start = int(order[place]) * c.size
-        return self.collate(cuts[start : start + c.size][rank::world])
+        whole = cuts[start : start + c.size]
+        longest, frames = max(len(cut[0]) for cut in whole), sum(len(cut[0]) for cut in whole)
+        return self.collate(whole[rank::world], longest, frames / world)
 
     def cut(self, sample: Sample, rng: np.random.Generator) -> tuple[NDArray[np.float32], str, str]:
         """One window of a sample: un-normalised rows [F, 67], caption, source."""
@@ -152,13 +159,20 @@ class BatchSource:
             features, caption = mirror_features67(features), mirror_caption(caption)
         return features, caption, sample.source
 
-    def collate(self, cuts: Sequence[tuple[NDArray[np.float32], str, str]]) -> Batch:
-        """Windows as one normalised, right-padded batch."""
+    def collate(
+        self,
+        cuts: Sequence[tuple[NDArray[np.float32], str, str]],
+        longest: int | None = None,
+        mean_frames: float | None = None,
+    ) -> Batch:
+        """Windows as one normalised batch, padded on the right to `longest` rows (that of the windows by default)."""
         lengths = np.array([len(cut[0]) for cut in cuts], np.int64)
-        features = np.zeros((len(cuts), int(lengths.max()), cuts[0][0].shape[1]), np.float32)
+        longest = longest or int(lengths.max())
+        features = np.zeros((len(cuts), longest, cuts[0][0].shape[1]), np.float32)
         for row, (rows, _, _) in enumerate(cuts):
             features[row, : len(rows)] = self.normaliser.apply(rows)
-        return Batch(features, lengths, [cut[1] for cut in cuts], [cut[2] for cut in cuts])
+        frames = float(lengths.sum()) if mean_frames is None else mean_frames
+        return Batch(features, lengths, [cut[1] for cut in cuts], [cut[2] for cut in cuts], frames)
 
 
 def whole_batches(samples: Sequence[Sample], normaliser: Normaliser, size: int, unit: int = 4) -> list[Batch]:

@@ -43,6 +43,18 @@ def resample_up(x: Tensor, size: int) -> Tensor:
     return F.interpolate(x.transpose(1, 2), size, mode="linear", align_corners=False).transpose(1, 2)
 
 
+def _distributed() -> bool:
+    return torch.distributed.is_available() and torch.distributed.is_initialized()
+
+
+def _from_first_process(x: Tensor) -> Tensor:
+    """The first process's x on every process; x itself where there is one process."""
+    if _distributed():
+        x = x.contiguous()
+        torch.distributed.broadcast(x, src=0)
+    return x
+
+
 class Codebook(nn.Module):
     """V code vectors of width D learned as moving averages (decay 0.99) of the vectors that choose them."""
 
@@ -72,7 +84,7 @@ class Codebook(nn.Module):
     @torch.no_grad()
     def start(self, vectors: Tensor) -> None:
         """Take the first codes from a batch of vectors [n, D] (A6, init)."""
-        self.vectors.copy_(self.fill(vectors))
+        self.vectors.copy_(_from_first_process(self.fill(vectors)))
         self.sums.copy_(self.vectors)
         self.counts.fill_(1.0)
 
@@ -82,17 +94,15 @@ class Codebook(nn.Module):
         size = len(self.counts)
         counts = torch.zeros_like(self.counts).index_add_(0, ids, torch.ones_like(vectors[:, 0]))
         sums = torch.zeros_like(self.sums).index_add_(0, ids, vectors)
-        if torch.distributed.is_available() and torch.distributed.is_initialized():
+        if _distributed():
             torch.distributed.all_reduce(counts)
             torch.distributed.all_reduce(sums)
         self.counts.lerp_(counts, 1 - self.decay)
         self.sums.lerp_(sums, 1 - self.decay)
         alive = (self.counts >= 1.0)[:, None]
         average = self.sums / self.counts.clamp(min=1e-5)[:, None]
-        spare = self.fill(vectors)
-        if torch.distributed.is_available() and torch.distributed.is_initialized():
-            torch.distributed.broadcast(spare, src=0)
-        self.vectors.copy_(torch.where(alive, average, spare[:size]))
+        spare = _from_first_process(self.fill(vectors))
+        self.vectors.copy_(torch.where(alive, average, spare))
 
 
 class Phi(nn.Module):

@@ -21,31 +21,42 @@ HEADING_SCALE = 0.4  # radians of yaw that move an outstretched hand by about on
 
 
 def tokenizer_loss(
-    out: TrainingOutput, features: Tensor, lengths: Tensor, config: TokenizerTraining, heading_std: float
+    out: TrainingOutput,
+    features: Tensor,
+    lengths: Tensor,
+    config: TokenizerTraining,
+    heading_std: float,
+    mean_frames: float,
 ) -> Tensor:
     """smoothL1 on the features + weighted commitment (+ accumulated heading); scalar. heading_std: std of column 0.
 
+    mean_frames: what sums over real frames are divided by (see Batch).
+
     With masked_mean the mean runs over real frames, else over all frames with padding as exact zeros (systems.md H16).
     """
-    reconstruction = out.features.float()
+    short = features.shape[1] - out.features.shape[1]  # another process may hold the longest motion of the batch
+    reconstruction = F.pad(out.features.float(), (0, 0, 0, short))
     real = torch.arange(features.shape[1], device=lengths.device)[None] < lengths[:, None]
     error = F.smooth_l1_loss(reconstruction, features, reduction="none").mean(dim=-1)
-    loss = (error * real).sum() / real.sum() if config.masked_mean else error.mean()
+    loss = (error * real).sum() / mean_frames if config.masked_mean else error.mean()
     if config.heading:
         turned = ((reconstruction[..., 0] - features[..., 0]) * real).cumsum(dim=1) * (2 * heading_std / HEADING_SCALE)
         drift = F.smooth_l1_loss(turned, torch.zeros_like(turned), reduction="none") * real
-        loss = loss + config.heading * drift.sum() / real.sum()
+        loss = loss + config.heading * drift.sum() / mean_frames
     return loss + config.commitment * out.commitment
 
 
 class TokenizerInputs:
     """One training batch on the device. Not a dataclass: Fabric would round its numbers to half precision."""
 
-    def __init__(self, features: Tensor, lengths: Tensor, text: TextFeatures, dropped: Tensor) -> None:
+    def __init__(
+        self, features: Tensor, lengths: Tensor, text: TextFeatures, dropped: Tensor, mean_frames: float
+    ) -> None:
         self.features = features  # float32 [B, F, 67]
         self.lengths = lengths  # int64 [B]
         self.text = text
         self.dropped = dropped  # bool [B], no language
+        self.mean_frames = mean_frames
 
 
 class TokenizerStep(nn.Module):
@@ -60,7 +71,7 @@ class TokenizerStep(nn.Module):
     def forward(self, batch: TokenizerInputs) -> tuple[Tensor, Tensor, Tensor]:
         """A batch -> loss, share of codes hit (mean over scales), commitment; scalars."""
         out = self.tokenizer(batch.features, batch.lengths, batch.text, batch.dropped)
-        loss = tokenizer_loss(out, batch.features, batch.lengths, self.config, self.heading_std)
+        loss = tokenizer_loss(out, batch.features, batch.lengths, self.config, self.heading_std, batch.mean_frames)
         sizes = self.tokenizer.quantizer.codes
         used = [len(ids.unique()) / codes for ids, codes in zip(out.ids, sizes, strict=True)]
         return loss, loss.new_tensor(used).mean(), out.commitment.detach()
@@ -101,7 +112,7 @@ class TokenizerTask:
         rng = np.random.default_rng([self.config.seed, 1, step])
         drop = rng.random(self.config.batch.size) < self.config.language_drop
         dropped = torch.from_numpy(drop[rank::world]).to(self.device)
-        loss, used, commitment = model(TokenizerInputs(features, lengths, text, dropped))
+        loss, used, commitment = model(TokenizerInputs(features, lengths, text, dropped, batch.mean_frames))
         return loss, {"codes hit": float(used), "commitment": float(commitment)}
 
     def validate(self) -> dict[str, float]:

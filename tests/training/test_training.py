@@ -188,7 +188,7 @@ def test_loss_equals_a_loop(masked, heading):
             yaw = 2 * turned * 0.0128 / 0.4
             drift += 0.5 * yaw**2 if abs(yaw) < 1 else abs(yaw) - 0.5
     expected = total / (9 if masked else 12) + heading * drift / 9 + 0.02 * 0.7
-    loss = tokenizer_loss(TrainingOutput(guess, torch.tensor(0.7), ()), truth, lengths, config, 0.0128)
+    loss = tokenizer_loss(TrainingOutput(guess, torch.tensor(0.7), ()), truth, lengths, config, 0.0128, 9.0)
     assert float(loss) == pytest.approx(expected, rel=1e-5)
 
 
