@@ -122,14 +122,15 @@ def _clips(files: list[Path], body: Body, left_out: Counter[str]) -> Iterator[Li
             left_out["motions of another body"] += 1
             continue
         words = words_of(path.stem.removeprefix("humanoid3d_"))
+        caption = CAPTIONS.get(path.stem, words)
         clip = library_clip(
             retarget(source).joints,
             left_out,
             id=f"deepmimic_{path.stem.removeprefix('humanoid3d_')}",
             source="DeepMimic",
             split=split_of(path.stem),
-            label=words,
-            captions=(CAPTIONS.get(path.stem, words),),
+            label=f"{words} {caption}",
+            captions=(caption,),
         )
         if clip:
             yield clip
