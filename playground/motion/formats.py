@@ -34,6 +34,7 @@ WRITTEN = (".npz", ".bvh", ".glb")
 JOINT_KEYS = ("joints", "jtr", "joints3d", "joint_positions", "positions", "keypoints3d", "features", "motion", "data")
 RATE_KEYS = ("fps", "mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "mocap_fps")
 POSE_KEYS = {"poses", "pose_body", "body_pose", "root_orient", "global_orient", "betas", "trans", "thetas"}
+FLAT = (3 * HUMAN22.size, COLUMNS, COLUMNS263)  # columns of a two-dimensional array: joints or features
 SMPL_JOINTS = (24, 52, 55, 73)  # SMPL, SMPL-H, SMPL-X without and with more: the first 22 are HUMAN22's
 MAX_SHARE_OF_DRIFT = 0.3  # standard deviation of a bone's length over its median, beyond which it is no bone
 
@@ -89,10 +90,17 @@ def _caption(arrays: Arrays) -> str:
     return str(arrays.values("caption").reshape(-1)[0])[: LIMITS.max_prompt_chars].strip()
 
 
+def _shape(header: Header) -> tuple[int, ...]:
+    """The shape of one motion: a leading 1, as models give it, left out."""
+    shape = header.shape
+    batch = len(shape) == 4 or (len(shape) == 3 and shape[2] in FLAT)
+    return shape[1:] if batch and shape[0] == 1 else shape
+
+
 def _is_motion(header: Header) -> bool:
-    """Whether an array could be joints or features: [F, J, 3], [F, 66], [F, 67] or [F, 263], maybe with a leading 1."""
-    shape = header.shape[1:] if len(header.shape) in (3, 4) and header.shape[0] == 1 else header.shape
-    return (len(shape) == 3 and shape[2] == 3) or (len(shape) == 2 and shape[1] in (66, COLUMNS, COLUMNS263))
+    """Whether an array could be joints or features: [F, J, 3], [F, 66], [F, 67] or [F, 263]."""
+    shape = _shape(header)
+    return (len(shape) == 3 and shape[2] == 3) or (len(shape) == 2 and shape[1] in FLAT)
 
 
 def _pick(arrays: Arrays) -> str:
@@ -117,7 +125,7 @@ def _pick(arrays: Arrays) -> str:
 
 def _check_shape(header: Header, fps: float) -> tuple[int, ...]:
     """The shape without a leading 1. PlaygroundError unless it is one of the accepted ones, before anything is read."""
-    shape = header.shape[1:] if len(header.shape) in (3, 4) and header.shape[0] == 1 else header.shape
+    shape = _shape(header)
     accepted = f"joints [frames, 22, 3] or {COLUMNS} or {COLUMNS263} HumanML3D columns are"
     if header.dtype.kind not in "fiu":
         raise PlaygroundError(f"the array does not hold numbers; {accepted} accepted")
@@ -127,7 +135,7 @@ def _check_shape(header: Header, fps: float) -> tuple[int, ...]:
             raise PlaygroundError(
                 f"the array has {shape[1]} joints; 22 in HumanML3D's order are accepted, or SMPL's 24, 52, 55 or 73"
             )
-    elif len(shape) == 2 and shape[1] in (3 * HUMAN22.size, COLUMNS, COLUMNS263):
+    elif len(shape) == 2 and shape[1] in FLAT:
         check_size("array", shape[0], HUMAN22.size, fps)
     else:
         raise PlaygroundError(f"the array has the shape {list(header.shape)[:6]}; {accepted} accepted")
@@ -136,9 +144,9 @@ def _check_shape(header: Header, fps: float) -> tuple[int, ...]:
 
 def _joints_of(values: NDArray[Any]) -> tuple[Array, str]:
     """An array of an accepted shape -> joints [F, 22, 3] in its own unit, and how it was understood."""
+    values = values.astype(np.float64)
     if not np.isfinite(values).all() or np.abs(values).max() > 1e9:
         raise PlaygroundError("the array holds NaN, infinite or huge values; every value must be a finite number")
-    values = values.astype(np.float64)
     if values.ndim == 3:
         joints, total = values[:, : HUMAN22.size], values.shape[1]
         if total == HUMAN22.size:

@@ -1,4 +1,4 @@
-"""Other people's skeletons for the tests: one motion under the names, zero pose, unit, axes and channels of many tools."""
+"""Other people's skeletons for the tests: one motion under the names, zero pose, unit and axes of many tools."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -134,7 +134,7 @@ def test_forward_kinematics_of_a_small_file() -> None:
         lambda t: t.replace("Frames: 4", "Frames: 4 ").rstrip("\n"),
     ],
 )
-def test_what_files_in_the_wild_do_is_forgiven(change) -> None:  # noqa: ANN001
+def test_what_files_in_the_wild_do_is_forgiven(change) -> None:
     wanted = read_bvh(GOOD.encode())
     source = read_bvh(change(GOOD).encode())
     assert source.names == wanted.names and np.allclose(source.positions, wanted.positions)
@@ -193,7 +193,7 @@ def test_names_with_spaces_stay_whole() -> None:
         (lambda t: t.replace("0 9 0 90", "0 x 0 90"), "'x'"),
     ],
 )
-def test_broken_files_get_one_clear_sentence(change, word: str) -> None:  # noqa: ANN001
+def test_broken_files_get_one_clear_sentence(change, word: str) -> None:
     broken = change(GOOD)
     assert broken != GOOD
     import re

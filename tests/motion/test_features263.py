@@ -64,12 +64,12 @@ def test_columns_against_scalar_loops() -> None:
 
 
 def test_the_layout_is_humanml3ds() -> None:
-    assert (f.COLUMNS263, f.ROTATIONS, f.VELOCITIES, f.CONTACTS) == (
+    assert (
         263,
         slice(67, 193),
         slice(193, 259),
         slice(259, 263),
-    )
+    ) == (f.COLUMNS263, f.ROTATIONS, f.VELOCITIES, f.CONTACTS)
 
 
 @given(SEEDS)

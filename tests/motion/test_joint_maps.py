@@ -14,7 +14,7 @@ from tests.motion.skeletons import NONSENSE, STYLES, Rig, bvh_text, walk
 ROLES = [name for name in HUMAN22.joints if not name.startswith(("pelvis", "spine"))]
 
 
-def source(names: dict[str, str], **options) -> Source:  # noqa: ANN003
+def source(names: dict[str, str], **options) -> Source:
     joints = walk()[:12]
     return with_ends(read_bvh(bvh_text(joints, Rig(names, **options)).encode()))
 

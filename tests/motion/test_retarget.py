@@ -76,7 +76,7 @@ def test_other_frame_rates_are_resampled(fps: int) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_zero_poses_that_are_no_t_pose(seed: int) -> None:
-    """Every joint has axes of its own, as where all bones lie along X: the pelvis may be off by the tilt of the spine."""
+    """Every joint has axes of its own, as where all bones lie along X: the pelvis may be off by the spine's tilt."""
     joints = walk()[:30]
     turns = Rotation.random(22, rng=np.random.default_rng(seed))
     result = through(joints, Rig(STYLES["Bandai Namco"], zero_pose=turns, positions_everywhere=True))

@@ -62,8 +62,9 @@ def test_mirroring_twice_is_nothing_and_keeps_rotations_and_positions_together()
 
 @pytest.mark.parametrize(
     ("frames", "joints", "fps", "word"),
-    [(3, 22, 20.0, "3 frames"), (1, 22, 20.0, "1 frame;"), (12_001, 22, 20.0, "12,001 frames"), (9, 121, 20.0, "121 joints"),
-     (9, 0, 20.0, "0 joints"), (9, 22, 0.0, "0 frames a second"), (9, 22, 1001.0, "1001"), (9, 22, float("nan"), "nan"),
+    [(3, 22, 20.0, "3 frames"), (1, 22, 20.0, "1 frame;"), (12_001, 22, 20.0, "12,001 frames"),
+     (9, 121, 20.0, "121 joints"), (9, 0, 20.0, "0 joints"), (9, 22, 0.0, "0 frames a second"),
+     (9, 22, 1001.0, "1001"), (9, 22, float("nan"), "nan"),
      (9, 22, -5.0, "-5")],
 )  # fmt: skip
 def test_sizes_outside_the_limits_are_named(frames: int, joints: int, fps: float, word: str) -> None:
