@@ -89,7 +89,7 @@ def test_motions_become_clips(package: Path, tmp_path: Path) -> None:
     joints = library.joints(0)
     assert len(joints) == 40  # 59 steps of 1/30 s at 20 fps, and the first pose
     travelled = joints[-1, 0] - joints[0, 0]
-    assert travelled[2] == pytest.approx(1.2 * 39 / 20, rel=0.05) and abs(travelled[0]) < 0.02
+    assert travelled[2] == pytest.approx(1.2 * 39 / 20, rel=0.05) and abs(travelled[0]) < 0.1
     assert joints[:, 4, 2].mean() > joints[:, 7, 2].mean()  # a bent knee is in front of its ankle
 
 
