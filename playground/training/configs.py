@@ -44,7 +44,7 @@ TOKENIZERS: dict[str, TokenizerTraining] = {
     "lgtok-lite-tokenizer": TokenizerTraining(
         model=PRESETS["lite"],
         batch=BatchConfig(size=32, speed=0.3, source_balance=0.5, action_balance=0.3),
-        schedule=Schedule(steps=3_000, rate=1e-3),
+        schedule=Schedule(steps=2_600, rate=1e-3),
         heading=0.02,
         masked_mean=True,
     ),

@@ -1,7 +1,7 @@
 """`train CONFIG`: builds the data, the model and the task of a named run, and fits it."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,25 @@ from playground.text.store import FeatureStore
 from playground.tokenizers.transformer import LGTok, build_tokenizer
 from playground.training.configs import GENERATORS, TOKENIZERS, GeneratorTraining, TokenizerTraining, with_steps
 from playground.training.generator import GeneratorTask, build_bank
-from playground.training.loop import Launch, fit, start_fabric
+from playground.training.loop import Launch, Task, fit, start_fabric
 from playground.training.tokenizer import TokenizerTask
+
+
+@dataclass(frozen=True)
+class Order:
+    """What was asked for besides the name of the run."""
+
+    library: Path
+    out: Path
+    resume: bool
+    steps: int | None
+    launch: Launch
+    on_step: Callable[[int, float], None] | None
+
+    def fit(self, fabric: Any, task: Task, config: TokenizerTraining | GeneratorTraining, out: Path) -> dict[str, Any]:
+        """Train, with the number of steps asked for."""
+        schedule = with_steps(config.schedule, self.steps)
+        return fit(fabric, task, schedule, out, seed=config.seed, resume=self.resume, on_step=self.on_step)
 
 
 def train(
@@ -38,77 +55,61 @@ def train(
 
     PlaygroundError for an unknown name, a folder that is no library, or a run that exists while `resume` is not set.
     """
-    launch = launch or Launch()
+    order = Order(library, out, resume, steps, launch or Launch(), on_step)
     if config in TOKENIZERS:
-        return _train_tokenizer(TOKENIZERS[config], library, out / "tokenizer", resume, steps, launch, on_step)
+        return _train_tokenizer(TOKENIZERS[config], order)
     if config in GENERATORS:
-        return _train_generator(GENERATORS[config], library, out, resume, steps, launch, on_step)
-    known = ", ".join([*TOKENIZERS, *GENERATORS])
-    raise PlaygroundError(f"unknown training {config!r}; known are {known}")
+        return _train_generator(GENERATORS[config], order)
+    raise PlaygroundError(f"unknown training {config!r}; known are {', '.join([*TOKENIZERS, *GENERATORS])}")
 
 
 def training_batches(
-    library: Library, config: Any, synthetic: float, normaliser: Normaliser | None = None
+    library: Library, config: TokenizerTraining | GeneratorTraining, normaliser: Normaliser
 ) -> BatchSource:
     """Batches over the training split plus a share of the synthetic corpus."""
     samples = library_samples(library, "train")
     if not samples:
         raise PlaygroundError(f"the library {library.path} has no clip in its train split")
-    extra = round(len(samples) * synthetic)
+    extra = round(len(samples) * config.synthetic)
     if extra:
         samples = samples + synthetic_samples(corpus(extra, seed=0))
-    return BatchSource(samples, normaliser or library.normaliser, config.batch, config.seed)
+    return BatchSource(samples, normaliser, config.batch, config.seed)
 
 
-def _train_tokenizer(
-    config: TokenizerTraining,
-    library_path: Path,
-    out: Path,
-    resume: bool,
-    steps: int | None,
-    launch: Launch,
-    on_step: Callable[[int, float], None] | None,
-) -> dict[str, Any]:
-    library = Library.open(library_path)
-    config = replace(config, schedule=with_steps(config.schedule, steps))
-    fabric = start_fabric(launch, out)
+def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
+    with_steps(config.schedule, order.steps)
+    library, out = Library.open(order.library), order.out / "tokenizer"
+    fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
-    batches = training_batches(library, config, config.synthetic)
+    batches = training_batches(library, config, library.normaliser)
     held_out = library_samples(library, "val")
-    texts = [*batches.captions(), *(c for s in held_out for c in s.captions), ""]
-    store = FeatureStore.cached(library_path, texts, encoder)
+    texts = [*batches.captions(), *(caption for sample in held_out for caption in sample.captions), ""]
+    store = FeatureStore.cached(order.library, texts, encoder)
     validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
     with torch.random.fork_rng():
         torch.manual_seed(config.seed)
         model = build_tokenizer(replace(config.model, text_width=encoder.width))
     task = TokenizerTask(model, config, batches, validation, store, encoder, library.name, fabric.device)
-    return fit(fabric, task, config.schedule, out, seed=config.seed, resume=resume, on_step=on_step)
+    return order.fit(fabric, task, config, out)
 
 
-def _train_generator(
-    config: GeneratorTraining,
-    library_path: Path,
-    out: Path,
-    resume: bool,
-    steps: int | None,
-    launch: Launch,
-    on_step: Callable[[int, float], None] | None,
-) -> dict[str, Any]:
-    tokenizer_path = out / "tokenizer" / "checkpoint.safetensors"
+def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
+    with_steps(config.schedule, order.steps)
+    tokenizer_path = order.out / "tokenizer" / "checkpoint.safetensors"
     if not tokenizer_path.is_file():
         raise PlaygroundError(f"{tokenizer_path} is absent; train {config.tokenizer} into the same folder first")
     tokenizer, card = load_tokenizer(tokenizer_path)
-    library = Library.open(library_path)
-    config = replace(config, schedule=with_steps(config.schedule, steps))
-    fabric = start_fabric(launch, out / "generator")
+    library, out = Library.open(order.library), order.out / "generator"
+    normaliser = card.normaliser or library.normaliser
+    fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
     check_same(card.encoder, encoder)
-    batches = training_batches(library, config, config.synthetic, card.normaliser)
-    whole = BatchConfig(size=config.batch.size, whole=1.0, shorter=0.0, mirror=0.0)
+    batches = training_batches(library, config, normaliser)
     samples = library_samples(library, "val")
-    held_out = BatchSource(samples, batches.normaliser, whole, config.seed) if samples else None
+    whole = BatchConfig(size=config.batch.size, whole=1.0, shorter=0.0, mirror=0.0)
+    held_out = BatchSource(samples, normaliser, whole, config.seed) if samples else None
     texts = [*batches.captions(), *(held_out.captions() if held_out else []), ""]
-    store = FeatureStore.cached(library_path, texts, encoder)
+    store = FeatureStore.cached(order.library, texts, encoder)
     tokenizer = tokenizer.to(fabric.device)
     with Progress("tokenizing the training clips") as progress:
         bank = build_bank(tokenizer, batches, store, config.variants, fabric.device, progress)
@@ -119,7 +120,7 @@ def _train_generator(
     task = GeneratorTask(
         model, tokenizer.quantizer, config, bank, checked, store, encoder, library.name, card.hash[:12], fabric.device
     )
-    return fit(fabric, task, config.schedule, out / "generator", seed=config.seed, resume=resume, on_step=on_step)
+    return order.fit(fabric, task, config, out)
 
 
 def generator_config(config: GeneratorTraining, tokenizer: LGTok, text_width: int) -> GeneratorConfig:
