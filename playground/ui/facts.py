@@ -61,7 +61,7 @@ def facts_line(facts: Sequence[Fact], badge: str = "") -> str:
     """A result in one line of HTML: the facts, then a badge where no stage shows it. Empty without facts."""
     if not facts:
         return ""
-    cells = "".join(_cell(fact) for fact in facts)
+    cells = " ".join(_cell(fact) for fact in facts)
     last = f'<div class="mtp-fact">{badge}</div>' if badge else ""
     return f'<dl class="mtp-facts">{cells}{last}</dl>'
 

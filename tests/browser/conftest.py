@@ -27,6 +27,13 @@ class Visit:
         self.page.get_by_role("tab", name=room, exact=True).click()
         return self.page
 
+    def settle(self) -> None:
+        """Wait until the page has asked for nothing new for half a second."""
+        count = -1
+        while count != len(self.requests):
+            count = len(self.requests)
+            self.page.wait_for_timeout(500)
+
     def sent_since(self, mark: int) -> list[str]:
         """Requests that went out after the list had `mark` entries, streams that stay open left aside."""
         return [url for url in self.requests[mark:] if "heartbeat" not in url]
@@ -70,6 +77,6 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
 
 @pytest.fixture(scope="session")
 def stand_in() -> Iterator[str]:
-    """Address of the page on the engine's stand-in, a third of a second a scale of a generation."""
-    with serving("-m", "tests.ui.serve", "{port}", "0.3") as address:
+    """Address of the page on the engine's stand-in, half a second a scale of a generation."""
+    with serving("-m", "tests.ui.serve", "{port}", "0.5") as address:
         yield address

@@ -15,6 +15,7 @@ from playground.ui.facts import Fact, significant
 from playground.ui.layout import LEAVE_AFTER, panel, room_frame, stage_and_score, words
 from playground.ui.scenes import generated_scene, token_facts
 from playground.ui.services import Services
+from playground.ui.stage.component import stage_call
 from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
@@ -26,6 +27,7 @@ PROMPTS = (
     "a person turns left while walking",
     "a person waves with both hands",
 )
+DOING = "Choosing the first tokens"
 ENTROPY_CARD = (
     "How undecided the generator was, on average over its tokens: at 0 bit one code was certain, at 3 bit it was like "
     "drawing one of eight. Faint cells are unsure ones."
@@ -147,10 +149,11 @@ def room(services: Services) -> None:
     runs = []
     for event in (go.click, prompt.submit):
         busy = event(_switch(True), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
-        run = attach(busy.then, generate, inputs, [stage, facts, progress], message)
+        run = attach(busy.then, generate, inputs, [stage, facts, progress], message, stage=NAME, doing=DOING)
         run.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
         runs.append(run)
-    halt = attach(cancel.click, stopped, [progress], [stage], message, cancels=runs)
+    halt = attach(cancel.click, stopped, [progress], [stage], message, cancels=runs, model=False)
+    halt.then(None, None, None, js=stage_call(NAME, "say", "ready"), api_visibility="private")
     halt.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
 
 
