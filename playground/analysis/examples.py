@@ -20,6 +20,7 @@ from playground.errors import PlaygroundError
 from playground.motion.synthetic import synthesise
 from playground.tokenizers.token_file import LevelTokens
 
+_LONG = 60  # frames: decoded clips of at least three seconds are preferred
 NOTE = "Motions and captions made for this project; recorded clips stand here as token sequences alone."
 
 
@@ -119,11 +120,11 @@ def _generated(recipe: Recipe, system: str, engine: Engine) -> StoredExample:
 
 
 def _decoded(bundle: Bundle) -> Iterator[StoredExample]:
-    """For each recipe the clip of its caption that is rebuilt best; nothing where no clip has the caption."""
+    """For each recipe the clip of its caption that is rebuilt best, a long one if there is one; else nothing."""
     for recipe in DECODED:
         rows = [row for row, clip in enumerate(bundle.clips) if clip.caption == recipe.caption]
         if rows:
-            row = min(rows, key=lambda place: (float(bundle.errors_mm[place]), place))
+            row = min(rows, key=lambda place: (bundle.clips[place].frames < _LONG, bundle.errors_mm[place], place))
             clip = bundle.clips[row]
             origin = f"{DECODED_NOTE.capitalize()} ({clip.source}); the recorded motion is not part of the playground."
             yield StoredExample(
