@@ -153,8 +153,11 @@ class Engine:
         top_k: float = 0.2,
         top_p: float = 0.95,
         deadline: float | None = LIMITS.deadline_seconds,
+        previews: bool = True,
     ) -> Iterator[GenerationStep]:
-        """Yield the motion after every scale. prompt None is free-form. cfg guides the generator, guidance the decoder.
+        """Yield the motion after every scale; without previews after the last one alone.
+
+        prompt None is free-form. cfg guides the generator, guidance the decoder.
 
         PlaygroundError for an empty prompt, a number out of range, or a run past the deadline (checked at every scale).
         """
@@ -166,23 +169,28 @@ class Engine:
         entropy: list[NDArray[np.float32]] = []
         for step in runtime.generate(text, frames, {**sampling, "check": check}):
             entropy.append(step.entropy)
+            if not previews and step.level < len(self.scales(system)):
+                continue
             features = runtime.decode_embedding(step.embedding, frames, text or "", guidance)
             joints = from_features67(runtime.normaliser.invert(features))
-            yield GenerationStep(step.level, step.levels, tuple(entropy), Motion(joints, caption=text or ""))
+            yield GenerationStep(step.level, step.levels, tuple(entropy), Motion(joints, caption=text or ""), features)
 
     def generate(
         self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, **options: Any
     ) -> Generation:
         """The finished motion; arguments as in `generate_steps`. The same seed gives the same tokens."""
         began = time.perf_counter()
-        *_, last = self.generate_steps(prompt, seconds, system, seed, **options)
-        runtime = self.runtime(system)
-        text = last.motion.caption
-        guidance = options.get("guidance", 2.0)
-        features = runtime.decode(last.levels, last.motion.frames, text, guidance, len(last.levels))
-        took = time.perf_counter() - began
+        (last,) = self.generate_steps(prompt, seconds, system, seed, previews=False, **options)
         return Generation(
-            system, runtime.checkpoint, text, seed, last.levels, last.entropy, last.motion, features, took
+            system=system,
+            checkpoint=self.runtime(system).checkpoint,
+            prompt=last.motion.caption,
+            seed=seed,
+            levels=last.levels,
+            entropy=last.entropy,
+            motion=last.motion,
+            features=last.features,
+            seconds=time.perf_counter() - began,
         )
 
     # ---- inside ---------------------------------------------------------------------------------------------------

@@ -51,6 +51,7 @@ class GenerationStep:
     levels: tuple[LevelTokens, ...]
     entropy: tuple[Floats, ...]  # [s_n] bits a scale, of the distributions drawn from
     motion: Motion  # decoded from the scales so far
+    features: Floats = field(repr=False)  # [F, 67] of that motion, normalised
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from playground.generators.base import Step
 from playground.limits import LIMITS
 from playground.nn.attention import CrossAttention, KeyValueCache, SelfAttention
 from playground.nn.blocks import SwiGLU
+from playground.nn.linear import Linear
 from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
 from playground.nn.rope import rope_angles
@@ -93,13 +94,13 @@ class ScalewiseTransformer(nn.Module):
     def __init__(self, config: GeneratorConfig) -> None:
         super().__init__()
         c = self.config = config
-        self.text_proj = nn.Linear(c.text_width, c.width)
-        self.sum_proj = nn.Linear(c.code_width, c.width)
+        self.text_proj = Linear(c.text_width, c.width)
+        self.sum_proj = Linear(c.code_width, c.width)
         self.start = nn.Parameter(torch.empty(c.scales[0], c.width))
         self.level = nn.Parameter(torch.empty(len(c.scales), c.width))
         self.length = nn.Parameter(torch.empty(c.lengths, c.width))
         self.layers = module_list(Layer(c.width, c.heads, c.hidden, c.dropout) for _ in range(c.depth))
-        self.heads = module_list(nn.Linear(c.width, v) for v in c.codes)
+        self.heads = module_list(Linear(c.width, v) for v in c.codes)
         for table in (self.start, self.level, self.length):
             nn.init.trunc_normal_(table, std=(1 / (3 * c.width)) ** 0.5)
         self.apply(_init)

@@ -7,6 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from playground.nn.attention import CrossAttention, Memory, SelfAttention
+from playground.nn.linear import Linear
 from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
 from playground.nn.rope import Rotation
@@ -19,8 +20,8 @@ class SwiGLU(nn.Module):
 
     def __init__(self, width: int, hidden: int, *, dropout: float = 0.0, bias: bool = True) -> None:
         super().__init__()
-        self.gate_up = nn.Linear(width, 2 * hidden, bias=bias)
-        self.down = nn.Linear(hidden, width, bias=bias)
+        self.gate_up = Linear(width, 2 * hidden, bias=bias)
+        self.down = Linear(hidden, width, bias=bias)
         self.dropout = dropout
 
     def forward(self, x: Tensor) -> Tensor:
@@ -33,8 +34,8 @@ class GELU(nn.Module):
 
     def __init__(self, width: int, hidden: int, *, dropout: float = 0.0) -> None:
         super().__init__()
-        self.up = nn.Linear(width, hidden)
-        self.down = nn.Linear(hidden, width)
+        self.up = Linear(width, hidden)
+        self.down = Linear(hidden, width)
         self.dropout = dropout
 
     def forward(self, x: Tensor) -> Tensor:
@@ -127,7 +128,7 @@ class UStack(nn.Module):
             Block(width, heads, hidden, memories=memories, dropout=dropout, norm=norm, pre=pre, feed=feed)
             for _ in range(depth)
         )
-        self.merges = module_list(nn.Linear(2 * width, width) for _ in range(self.paired))
+        self.merges = module_list(Linear(2 * width, width) for _ in range(self.paired))
         self.entry = build_norm(norm, width)
         self.exit = build_norm(norm, width)
 

