@@ -29,7 +29,6 @@ _BAD_ZIP = (
     zlib.error,
     struct.error,
     ValueError,
-    NotImplementedError,
     RuntimeError,
     EOFError,
     OSError,

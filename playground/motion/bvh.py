@@ -20,6 +20,7 @@ from playground.motion.skeleton import HUMAN22
 from playground.motion.source import Source, check_size
 
 CHANNELS = {f"{axis}{kind}": (kind, "xyz".index(axis)) for axis in "xyz" for kind in ("position", "rotation")}
+MAX_VALUE = 1e7  # degrees, or lengths in the unit of the file
 MAX_HEADER = 1_000_000  # characters of the HIERARCHY part
 _CHUNK = 1_000_000  # characters of numbers that are parsed at a time
 ORDER = "ZXY"
@@ -50,8 +51,8 @@ def _number(word: str, what: str) -> float:
         value = float(word)
     except ValueError:
         raise _bad(f"{what} says '{word[:20]}' where a number belongs") from None
-    if not np.isfinite(value):
-        raise _bad(f"{what} holds a value that is not finite")
+    if not abs(value) <= MAX_VALUE:
+        raise _bad(f"{what} holds a value that is not finite or beyond {MAX_VALUE:,.0f}")
     return value
 
 
@@ -154,8 +155,8 @@ def _read_values(body: str, frames: int, columns: int) -> Array:
             raise _bad(f"among the motion values there is {str(error).split(':')[-1].strip()[:40]}") from None
         at = stop
     values = np.concatenate(parts) if parts else np.zeros(0)
-    if not np.isfinite(values).all():
-        raise _bad("the motion values must all be finite numbers")
+    if not (np.abs(values) <= MAX_VALUE).all():
+        raise _bad(f"the motion values must all be finite numbers up to {MAX_VALUE:,.0f}")
     if len(values) < frames * columns or len(values) % columns:
         raise _bad(
             f"{frames} frames of {columns} channels need {frames * columns:,} values, but there are {len(values):,}; "

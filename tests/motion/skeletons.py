@@ -44,6 +44,19 @@ STYLES: dict[str, dict[str, str]] = {
                    "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
     ),
     "Rokoko": _sided(_TORSO | _IK | {"hip": "Thigh", "knee": "Shin", "foot": "Toe"}),
+    "Biovision": _sided(
+        _CHESTS | {"hip": "UpLeg", "knee": "LowLeg", "ankle": "Foot", "foot": "Toe", "collar": "Collar",
+                   "shoulder": "UpArm", "elbow": "LowArm", "wrist": "Hand"}
+    ),
+    "Unity": _sided(
+        _TORSO | {"hip": "UpperLeg", "knee": "LowerLeg", "ankle": "Foot", "foot": "Toes", "collar": "Shoulder",
+                  "shoulder": "UpperArm", "elbow": "LowerArm", "wrist": "Hand"}
+    ),
+    "Daz": _sided(
+        {"pelvis": "hip", "spine1": "abdomen", "spine2": "waist", "spine3": "chest", "neck": "neck", "head": "head",
+         "hip": "Thigh", "knee": "Shin", "ankle": "Foot", "foot": "Toe", "collar": "Collar", "shoulder": "Shldr",
+         "elbow": "ForeArm", "wrist": "Hand"}, "{side}{name}", {"l": "l", "r": "r"}
+    ),
     "Biped": _sided(
         {"pelvis": "Bip01 Pelvis", "spine1": "Bip01 Spine", "spine2": "Bip01 Spine1", "spine3": "Bip01 Spine2",
          "neck": "Bip01 Neck", "head": "Bip01 Head", "hip": "Thigh", "knee": "Calf", "ankle": "Foot", "foot": "Toe0",

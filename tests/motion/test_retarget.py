@@ -204,3 +204,42 @@ def test_a_collapsed_skeleton_is_refused() -> None:
 def test_other_actions_come_through(action: str) -> None:
     joints = synthesise(action, np.random.default_rng(2)).motion.joints[:60]
     assert error(through(joints, Rig(IK)), joints) < 0.01
+
+
+def random_file(seed: int) -> str:
+    """A BVH file of a random tree with random bones and random angles; some names are a body's."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 40))
+    parents = [-1, *(int(rng.integers(max(0, k - 4), k)) for k in range(1, count))]
+    offsets = rng.normal(size=(count, 3)) * 10 * (rng.random((count, 1)) > rng.choice([0.0, 0.4]))
+    words = [*IK.values(), "Spine7", "x"]
+    rng.shuffle(words)
+    lines: list[str] = ["HIERARCHY"]
+
+    def write(j: int) -> None:
+        name = words[j] if j < len(words) and seed % 3 else f"j{j}"
+        place = "6 Xposition Yposition Zposition" if j == 0 else "3"
+        lines.extend([f"{'JOINT' if j else 'ROOT'} {name} {{", "OFFSET " + " ".join(f"{v:f}" for v in offsets[j])])
+        lines.append(f"CHANNELS {place} Zrotation Xrotation Yrotation")
+        kids = [c for c in range(count) if parents[c] == j]
+        for c in kids:
+            write(c)
+        lines.extend([] if kids else [f"End Site {{\nOFFSET 0 {rng.integers(0, 2)} 0\n}}"])
+        lines.append("}")
+
+    write(0)
+    frames, size = int(rng.integers(4, 9)), float(rng.choice([0.0, 1.0, 90.0, 1e6]))
+    rows = [" ".join(f"{v:f}" for v in row) for row in rng.normal(size=(frames, 3 * count + 3)) * size]
+    return "\n".join([*lines, "MOTION", f"Frames: {frames}", f"Frame Time: {rng.choice([0.05, 0.01, 0.3])}", *rows])
+
+
+@pytest.mark.parametrize("block", range(4))
+@pytest.mark.filterwarnings("error")
+def test_random_skeletons_end_in_a_motion_or_a_sentence(block: int) -> None:
+    for seed in range(30 * block, 30 * block + 30):
+        try:
+            result = retarget(read_bvh(random_file(seed).encode()))
+        except PlaygroundError as error:
+            assert "\n" not in str(error)
+        else:
+            assert np.isfinite(result.joints).all() and np.abs(result.joints).max() <= 200.0
