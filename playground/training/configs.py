@@ -60,7 +60,7 @@ class GeneratorTraining:
     batch: BatchConfig = field(default_factory=BatchConfig)
     schedule: Schedule = field(default_factory=Schedule)
     size: int = 32  # motions a batch
-    variants: int = 6  # windows tokenized of every clip
+    variants: int = 5  # windows tokenized of every clip
     text: str = "minilm"
     synthetic: float = 0.1
     keep: float = 0.5  # share of the input tokens kept; the others become random codes
@@ -73,7 +73,7 @@ GENERATORS: dict[str, GeneratorTraining] = {
         model=GENERATOR_PRESETS["lite"],
         tokenizer="lgtok-lite-tokenizer",
         batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-        schedule=Schedule(steps=3_600, rate=6e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+        schedule=Schedule(steps=2_600, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
     ),
 }
 
