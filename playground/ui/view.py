@@ -50,7 +50,7 @@ def read_view(path: Path, made_from: str = "") -> View | None:
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
         view = View(facts=tuple(Fact(**fact) for fact in values.pop("facts")), **values)
+        current = view.stage.get("version", scene.VERSION) == scene.VERSION and view.made_from == made_from
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
-    current = view.stage.get("version", scene.VERSION) == scene.VERSION and view.made_from == made_from
     return view if current else None

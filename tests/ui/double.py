@@ -140,7 +140,8 @@ class FakeEngine:
         for n in range(1, len(levels) + 1):
             self.pause()
             entropy.append(rng.uniform(0, 5, SIZES[n - 1]).astype(np.float32))
-            yield GenerationStep(n, levels[:n], tuple(entropy), _shaken(clean, 0.4 * 0.7**n))
+            motion = _shaken(clean, 0.4 * 0.7**n)
+            yield GenerationStep(n, levels[:n], tuple(entropy), motion, _features(motion))
 
     def guidance_pair(self, result: Tokenized, caption: str | None = None) -> GuidancePair:
         self.calls.append("guidance_pair")
