@@ -32,20 +32,29 @@ from playground.figures.stage import Json
 
 _HERE = Path(__file__).parent
 _MODULES = (
-    "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "figures", "rows", "score",
-    "timeline", "toolbar", "gestures", "keys", "notices", "stage", "index",
+    "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "labels", "figures", "rows",
+    "score", "timeline", "toolbar", "gestures", "keys", "notices", "stage", "index",
 )  # fmt: skip
+# The modules are fetched once a page, by the first stage that is shown. With stage_script() in its head a page has them.
 _ON_LOAD = """
-const options = JSON.parse(props.options);
-options.onEvent = (event, detail) => {
-  if (event === "select") trigger("select", { selection: detail });
-  if (event === "span") trigger("span", { span: detail });
-  if (event === "scale") trigger("pick_scale", { scale: detail.scale });
+const start = () => {
+  const options = JSON.parse(props.options);
+  options.onEvent = (event, detail) => {
+    if (event === "select") trigger("select", { selection: detail });
+    if (event === "span") trigger("span", { span: detail });
+    if (event === "scale") trigger("pick_scale", { scale: detail.scale });
+  };
+  const stage = MotionStage.mount(element.querySelector(".ms-host"), props.value || null, options);
+  watch("value", () => stage.setPayload(props.value || null));
 };
-const stage = MotionStage.mount(element.querySelector(".ms-host"), props.value || null, options);
-watch("value", () => stage.setPayload(props.value || null));
+if (window.MotionStage) start();
+else (window.motionStageLoading ??= server.stage_source().then((source) => new Function(source)())).then(start);
 """
-_SLOT_ON_LOAD = 'MotionStage.adoptScore(props.stage, element.querySelector(".ms-host"));'
+_SLOT_ON_LOAD = """
+const slot = [props.stage, element.querySelector(".ms-host")];
+if (window.MotionStage) MotionStage.adoptScore(...slot);
+else (window.motionStageSlots ??= []).push(slot);
+"""
 _HOST = '<div class="ms-host"></div>'
 
 
@@ -68,7 +77,8 @@ def stage_component(
     return gr.HTML(
         value=value,
         html_template=_HOST,
-        js_on_load=stage_script() + _ON_LOAD,
+        js_on_load=_ON_LOAD,
+        server_functions=[stage_source],
         apply_default_css=False,
         options=json.dumps(options),
         **settings,
@@ -80,7 +90,7 @@ def score_slot(name: str, **settings: Any) -> gr.HTML:
     return gr.HTML(
         value="",
         html_template=_HOST,
-        js_on_load=stage_script() + _SLOT_ON_LOAD,
+        js_on_load=_SLOT_ON_LOAD,
         apply_default_css=False,
         stage=name,
         **settings,
@@ -98,6 +108,11 @@ def stage_call(name: str, method: str, *arguments: Any) -> str:
     )
 
 
+def stage_source(_: Any = None) -> str:
+    """What the first stage of a page asks the server for."""
+    return stage_script()
+
+
 @lru_cache(maxsize=1)
 def stage_script() -> str:
     """All modules as one classic script: it defines window.MotionStage once a page and brings its style sheet along."""
@@ -107,6 +122,7 @@ def stage_script() -> str:
         f"window.MotionStage ??= (() => {{\n{modules}"
         f"document.head.append(module_dom.el('style', {{ text: {style} }}));\n"
         "return { ...module_index, ...module_guidance };\n})();\n"
+        "for (const slot of window.motionStageSlots || []) MotionStage.adoptScore(...slot);\n"
     )
 
 

@@ -2,11 +2,13 @@
 
 import { css, mix, readable, systemColour } from "./colour.js";
 import { project } from "./camera.js";
-import { clear, el } from "./dom.js";
-import { findContacts, paintContacts, paintFade, paintGrid, paintShadow, paintTrail } from "./floor.js";
+import { clear } from "./dom.js";
+import { findContacts, paintContacts, paintFade, paintGrid, paintShadow, paintWay } from "./floor.js";
 import { guidedJoints } from "./guidance.js";
+import { Labels } from "./labels.js";
 import { Painter, tonesOf } from "./paint.js";
 import { createBody } from "./skeleton.js";
+import { locate, spanOf } from "./store.js";
 
 const WORDS = 44; // pixels under the figures that belong to their names
 const AIR = 10; // pixels above them
@@ -19,7 +21,8 @@ const REACHING = [ // joints that a body reaches farthest with
 
 export class Figures {
   constructor(canvas, labels, store, camera) {
-    Object.assign(this, { canvas, labels, store, camera });
+    Object.assign(this, { canvas, store, camera });
+    this.labels = new Labels(labels, canvas);
     Object.assign(this, { data: null, figures: [], theme: null, ratio: 1, spacing: 1.2, rows: 1, across: 1 });
     this.ctx = canvas.getContext("2d", { alpha: false });
     this.layer = document.createElement("canvas"); // where a figure is painted that is to be seen through
@@ -28,8 +31,7 @@ export class Figures {
   clear() {
     this.data = null;
     this.figures = [];
-    this.labels.replaceChildren();
-    this.canvas.setAttribute("aria-label", "No motion yet");
+    this.labels.clear();
   }
 
   setData(data) {
@@ -49,7 +51,7 @@ export class Figures {
       if (g !== null && data.features) figure.joints = guidedJoints(data.features, g);
       this.measure(figure);
     }
-    this.writeLabels();
+    this.labels.write(data);
     this.dress();
   }
 
@@ -73,20 +75,8 @@ export class Figures {
     for (const figure of this.figures) {
       figure.rgb = systemColour(figure.block, theme);
       figure.tones = tonesOf(figure.rgb, theme);
-      figure.label.style.setProperty("--system", css(readable(figure.rgb, theme.surface, theme.text)));
     }
-  }
-
-  writeLabels() {
-    for (const figure of this.figures) {
-      const { name, caption = "" } = figure.block;
-      figure.label = el("div", { class: "ms-label" }, el("strong", { text: name }), el("span", { text: caption }));
-    }
-    this.labels.replaceChildren(...this.figures.map((figure) => figure.label));
-    const told = this.figures.map(({ block }) => (block.caption ? `${block.name} (${block.caption})` : block.name));
-    const count = told.length === 1 ? "One figure" : `${told.length} figures in sync`;
-    const length = (this.data.frames / this.data.fps).toFixed(1);
-    this.canvas.setAttribute("aria-label", `${count}: ${told.join(", ")}. ${length} seconds.`);
+    this.labels.dress(this.figures.map(({ rgb }) => css(readable(rgb, theme.surface, theme.text))));
   }
 
   resize(width, height, ratio) {
@@ -199,7 +189,20 @@ export class Figures {
     ctx.fillRect(0, 0, camera.width, camera.height * this.rows);
     const lanes = this.figures.map((_, index) => this.laneOf(index));
     for (let row = 0; row < this.rows; row++) this.drawRow(row * this.across, lanes, frame, row * camera.height);
-    this.placeLabels(lanes, frame);
+    const spots = this.figures.map((figure, index) => this.labelSpot(figure, index, lanes[index], frame));
+    this.labels.place(spots, camera.width / this.across);
+  }
+
+  // Where the name of a figure goes: under it where figures have lanes, beside the others where they have one spot.
+  labelSpot(figure, index, [dx, dz], frame) {
+    const { camera, across } = this, { follow, layout } = this.store.state;
+    const y = (Math.floor(index / across) + 1) * camera.height - WORDS + 2;
+    const beside = (index - (across - 1) / 2) * Math.min(camera.width / across, 140);
+    if (layout === "overlay") return [camera.width / 2 + beside, y];
+    const t = Math.min(Math.floor(frame), figure.frames - 1), spot = [0, 0, 0];
+    const [cx, cz] = follow ? [camera.target[0], camera.target[2]] : figure.centre.subarray(2 * t, 2 * t + 2);
+    project(camera, cx + dx, 0.9, cz + dz, spot, 0);
+    return [Math.min(Math.max(spot[0], 40), camera.width - 40), y];
   }
 
   drawRow(first, lanes, frame, top) {
@@ -219,10 +222,22 @@ export class Figures {
   drawGround(figure, [dx, dz], frame) {
     const { ctx, camera, theme, data } = this, { trail } = this.store.state;
     const now = Math.min(frame, figure.frames - 1);
-    if (trail) paintTrail(ctx, camera, figure.rgb, figure.joints, figure.frames, this.width, now, dx, dz);
+    const way = (alpha, line, span, rgb = figure.rgb) =>
+      paintWay(ctx, camera, css(rgb, alpha), line, figure.joints, this.width, span, dx, dz);
+    const last = figure.frames - 1, lit = this.litSpan();
+    if (trail) way(0.85, 2, [0, now]);
+    if (trail) way(0.28, 1.5, [now, last]);
+    if (lit) way(1, 4, lit.map((frame) => Math.min(frame, last)), theme.focus);
     this.poseAt(figure, frame);
     paintShadow(ctx, camera, theme, this.pose, data.skeleton.parents, dx, dz);
     paintContacts(ctx, camera, figure.rgb, figure.contacts, now, data.fps, dx, dz, trail);
+  }
+
+  // Frames of the token under the pointer, or of the chosen one: their part of the way lights up on the floor.
+  litSpan() {
+    const { hover, selection } = this.store.state, { tracks } = this.data;
+    const cell = hover || locate(tracks, selection);
+    return cell && spanOf(tracks[cell.track], cell.level, cell.position);
   }
 
   drawFigure(figure, [dx, dz], frame) {
@@ -256,26 +271,6 @@ export class Figures {
     ctx.restore();
   }
 
-  placeLabels(lanes, frame) {
-    const { camera, figures, across } = this, point = [0, 0, 0], room = camera.width / across;
-    const { follow, layout } = this.store.state;
-    figures.forEach((figure, index) => {
-      let x = camera.width / 2 + (index - (across - 1) / 2) * Math.min(room, 140);
-      if (layout !== "overlay") {
-        const t = Math.min(Math.floor(frame), figure.frames - 1);
-        const [cx, cz] = follow ? [camera.target[0], camera.target[2]] : figure.centre.subarray(2 * t, 2 * t + 2);
-        project(camera, cx + lanes[index][0], 0.9, cz + lanes[index][1], point, 0);
-        x = point[0];
-      }
-      x = Math.round(Math.min(Math.max(x, 40), camera.width - 40));
-      const y = Math.round((Math.floor(index / across) + 1) * camera.height - WORDS + 2);
-      const place = `translate(${x}px, ${y}px) translateX(-50%)`;
-      if (figure.labelAt === place) return;
-      figure.labelAt = place;
-      figure.label.style.transform = place;
-      figure.label.style.maxWidth = `${Math.max(room - 8, 56)}px`;
-    });
-  }
 }
 
 function maxEvery(array, step, from) {

@@ -129,24 +129,22 @@ export function paintContacts(ctx, camera, rgb, contacts, frame, fps, dx, dz, al
   }
 }
 
-// Where the pelvis goes over the floor: the way behind it full, the way ahead faint.
-export function paintTrail(ctx, camera, rgb, joints, frames, width, frame, dx, dz) {
-  const now = Math.min(frame, frames - 1);
-  for (const [from, to, alpha, line] of [[0, now, 0.85, 2], [now, frames - 1, 0.28, 1.5]]) {
-    ctx.beginPath();
-    for (let t = from; ; t = Math.min(Math.floor(t) + 1, to)) {
-      const whole = Math.floor(t), share = t - whole;
-      const at = whole * width, next = Math.min(whole + 1, frames - 1) * width;
-      const x = joints[at] + (joints[next] - joints[at]) * share;
-      const z = joints[at + 2] + (joints[next + 2] - joints[at + 2]) * share;
-      project(camera, x + dx, 0.004, z + dz, spot, 0);
-      if (t === from) ctx.moveTo(spot[0], spot[1]);
-      else ctx.lineTo(spot[0], spot[1]);
-      if (t >= to) break;
-    }
-    ctx.strokeStyle = css(rgb, alpha);
-    ctx.lineWidth = line;
-    ctx.lineJoin = ctx.lineCap = "round";
-    ctx.stroke();
+// A part [from, to] (frames) of the pelvis's way over the floor; width: numbers in a pose.
+export function paintWay(ctx, camera, color, line, joints, width, [from, to], dx, dz) {
+  const last = joints.length / width - 1;
+  ctx.beginPath();
+  for (let t = from; ; t = Math.min(Math.floor(t) + 1, to)) {
+    const whole = Math.min(Math.floor(t), last), share = t - whole;
+    const at = whole * width, next = Math.min(whole + 1, last) * width;
+    const x = joints[at] + (joints[next] - joints[at]) * share;
+    const z = joints[at + 2] + (joints[next + 2] - joints[at + 2]) * share;
+    project(camera, x + dx, 0.004, z + dz, spot, 0);
+    if (t === from) ctx.moveTo(spot[0], spot[1]);
+    else ctx.lineTo(spot[0], spot[1]);
+    if (t >= to) break;
   }
+  ctx.strokeStyle = color;
+  ctx.lineWidth = line;
+  ctx.lineJoin = ctx.lineCap = "round";
+  ctx.stroke();
 }

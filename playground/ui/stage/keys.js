@@ -1,13 +1,13 @@
 // Keyboard of the stage. Keys reach the stage that has the focus, or else the one that is in sight.
 
-import { tokenAt } from "./store.js";
+import { locate, tokenAt } from "./store.js";
 import { toggleLayout, togglePlay } from "./toolbar.js";
 
 const stages = new Set();
 const TYPING = "input, textarea, select, [contenteditable], [role=slider], [role=tab], [role=listbox], [role=option]";
 let listening = false;
 
-// stage: {element, store, getData, camera, onCamera, locate}; returns a function that forgets it.
+// stage: {element, store, owns(node), getData(), camera, onCamera()}; returns a function that forgets it.
 export function listenToKeys(stage) {
   stages.add(stage);
   if (!listening) document.addEventListener("keydown", route);
@@ -68,8 +68,8 @@ function chooseScale({ store, getData }, scale) {
 }
 
 // The token that keys move from: the chosen one, else the one under the playhead at the chosen scale (or the finest).
-function current({ store, getData, locate }) {
-  const chosen = locate(store.state.selection);
+function current({ store, getData }, selection = store.state.selection) {
+  const chosen = locate(getData().tracks, selection);
   if (chosen) return chosen;
   const track = getData().tracks[0];
   if (!track) return null;
@@ -108,7 +108,7 @@ function goTo({ store, getData }, { track: index, level, position }, choose) {
 
 function selectUnderPlayhead(stage) {
   const { store, getData } = stage;
-  const cell = current({ ...stage, locate: () => null });
+  const cell = current(stage, null);
   if (!cell || !getData().tracks[cell.track].levels[cell.level].ids) return false;
   const { system } = getData().tracks[cell.track];
   store.commit("select", { selection: { system, scale: cell.level + 1, position: cell.position } });

@@ -3,7 +3,7 @@
 import { css, mix, textOn } from "./colour.js";
 import { clear, el, sizeCanvas } from "./dom.js";
 import { cellAt, cellEdges, describeCell, isUsed, layRows } from "./rows.js";
-import { spanOf, tokenAt } from "./store.js";
+import { locate, spanOf, tokenAt } from "./store.js";
 
 export const GUTTER = 36; // pixels left of the roll, for the scales' numbers
 export const MARGIN = 14; // pixels right of it, so that the playhead's end is seen
@@ -152,7 +152,7 @@ export class Score {
 
   // The chosen token, and thinly every place where the same code stands in its scale.
   drawSelection(ctx) {
-    const chosen = this.locate(this.store.state.selection);
+    const chosen = locate(this.data.tracks, this.store.state.selection);
     if (!chosen) return;
     const level = this.data.tracks[chosen.track].levels[chosen.level], { focus } = this.theme;
     this.band(ctx, this.spanOf(chosen), css(focus, 0.14));
@@ -167,10 +167,11 @@ export class Score {
     return spanOf(this.data.tracks[track], level, position);
   }
 
+  // Lights up a stretch of time in all rows.
   band(ctx, [from, to], color) {
     const scale = this.width / this.data.frames;
     ctx.fillStyle = color;
-    ctx.fillRect(from * scale, 0, (to - from) * scale, this.laid.height);
+    for (const row of this.laid.rows) ctx.fillRect(from * scale, row.y, (to - from) * scale, row.height);
   }
 
   ring(ctx, { track, level, position }, color, line) {
@@ -181,15 +182,6 @@ export class Score {
     ctx.beginPath();
     ctx.roundRect(from, row.y + 1, Math.max(2, to - from - 1), row.height - 2, 2);
     ctx.stroke();
-  }
-
-  // {system, scale, position} -> {track, level, position}, or null if this score has no such cell.
-  locate(selection) {
-    if (!selection || !this.data) return null;
-    const track = this.data.tracks.findIndex((candidate) => candidate.system === selection.system);
-    const level = selection.scale - 1, row = track >= 0 ? this.data.tracks[track].levels[level] : null;
-    const there = row && selection.position >= 0 && selection.position < row.size;
-    return there ? { track, level, position: selection.position } : null;
   }
 
   cellOf(event) {
@@ -211,7 +203,7 @@ export class Score {
       const cell = this.cellOf(event);
       if (!cell || !this.data.tracks[cell.track].levels[cell.level].ids) return;
       const selection = { system: this.data.tracks[cell.track].system, scale: cell.level + 1, position: cell.position };
-      const again = JSON.stringify(this.locate(store.state.selection)) === JSON.stringify(cell);
+      const again = JSON.stringify(locate(this.data.tracks, store.state.selection)) === JSON.stringify(cell);
       store.commit("select", { selection: again ? null : selection });
     });
   }

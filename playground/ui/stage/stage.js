@@ -10,7 +10,7 @@ import { listenToKeys } from "./keys.js";
 import { Notices } from "./notices.js";
 import { describeCell } from "./rows.js";
 import { GUTTER, MARGIN, Score } from "./score.js";
-import { COMMITS, createStore } from "./store.js";
+import { COMMITS, createStore, locate } from "./store.js";
 import { Timeline } from "./timeline.js";
 import { Toolbar } from "./toolbar.js";
 
@@ -58,7 +58,6 @@ export class Stage {
         element: this.element, store, camera: this.camera,
         owns: (node) => this.element.contains(node) || this.scorePart.contains(node),
         getData: () => this.data,
-        locate: (selection) => this.score.locate(selection),
         onCamera: () => this.redraw("figures"),
       }),
     ];
@@ -99,7 +98,7 @@ export class Stage {
   }
 
   show(data) {
-    const first = !this.scene, { state } = this.store;
+    const first = !this.scene;
     const scene = [data.frames, ...data.figures.map((figure) => figure.id)].join();
     const patch = { frames: data.frames, fps: data.fps, hover: null };
     if (data.features) patch.guidance = data.features.guidance;
@@ -132,13 +131,13 @@ export class Stage {
     if (has("selection")) this.speak();
     if (has("layout", "follow")) this.redraw("layout");
     if (has("scale", "scaleMode")) this.redraw("still");
-    if (has("hover", "span", "selection")) this.redraw("cells");
+    if (has("hover", "span", "selection")) this.redraw("cells", "figures");
     if (has("frame", "playing", "guidance", "trail", "ghost")) this.redraw("figures");
     this.toolbar.show(changed);
   }
 
   speak() {
-    const cell = this.score.locate(this.store.state.selection);
+    const cell = this.data && locate(this.data.tracks, this.store.state.selection);
     this.notices.speak(cell ? describeCell(this.data.tracks, cell, this.data.fps).flat().join(", ") : "");
   }
 

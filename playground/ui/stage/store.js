@@ -93,6 +93,15 @@ export function spanOf(track, level, position) {
   return spans ? [spans[2 * position], spans[2 * position + 1]] : shareOf(track, level, position);
 }
 
+// {system, scale, position} -> {track, level, position}, or null where these tracks have no such token.
+export function locate(tracks, selection) {
+  if (!selection) return null;
+  const track = tracks.findIndex((candidate) => candidate.system === selection.system);
+  const level = selection.scale - 1, row = track >= 0 ? tracks[track].levels[level] : null;
+  const there = row && selection.position >= 0 && selection.position < row.size;
+  return there ? { track, level, position: selection.position } : null;
+}
+
 // Position of the token under a frame, or -1 past the track's end.
 export function tokenAt(track, level, frame) {
   if (frame >= track.frames) return -1;

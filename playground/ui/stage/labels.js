@@ -1,0 +1,40 @@
+// Names and small captions under the figures, as text of the page; and the picture's own text alternative.
+
+import { el } from "./dom.js";
+
+export class Labels {
+  constructor(element, canvas) {
+    Object.assign(this, { element, canvas, nodes: [], places: [] });
+  }
+
+  clear() {
+    this.element.replaceChildren();
+    this.nodes = [];
+    this.canvas.setAttribute("aria-label", "No motion yet");
+  }
+
+  write(data) {
+    this.nodes = data.figures.map(({ name, caption = "" }) =>
+      el("div", { class: "ms-label" }, el("strong", { text: name }), el("span", { text: caption })));
+    this.places = [];
+    this.element.replaceChildren(...this.nodes);
+    const told = data.figures.map(({ name, caption }) => (caption ? `${name} (${caption})` : name));
+    const count = told.length === 1 ? "One figure" : `${told.length} figures in sync`;
+    const length = (data.frames / data.fps).toFixed(1);
+    this.canvas.setAttribute("aria-label", `${count}: ${told.join(", ")}. ${length} seconds.`);
+  }
+
+  dress(colors) {
+    this.nodes.forEach((node, index) => node.style.setProperty("--system", colors[index]));
+  }
+
+  // spots: [x, y] of the middle of each label's upper edge; room: pixels that one may be wide.
+  place(spots, room) {
+    spots.forEach(([x, y], index) => {
+      const place = `translate(${Math.round(x)}px, ${Math.round(y)}px) translateX(-50%)`;
+      if (this.places[index] === place + room) return;
+      this.places[index] = place + room;
+      Object.assign(this.nodes[index].style, { transform: place, maxWidth: `${Math.max(room - 8, 56)}px` });
+    });
+  }
+}
