@@ -26,14 +26,14 @@ SWING = 0.05  # metres that a fingertip goes one way before it counts as a swing
 
 def swings(track: Array, size: float) -> int:
     """How often a track [n] turns round after having gone more than `size` one way."""
-    turns, direction, extreme = 0, 0, float(track[0]) if len(track) else 0.0
+    turns, direction = 0, 0
+    low = high = float(track[0]) if len(track) else 0.0
     for value in map(float, track):
-        if direction >= 0 and value < extreme - size:
-            turns, direction, extreme = turns + (direction > 0), -1, value
-        elif direction <= 0 and value > extreme + size:
-            turns, direction, extreme = turns + (direction < 0), 1, value
-        elif direction:
-            extreme = max(extreme, value) if direction > 0 else min(extreme, value)
+        if direction >= 0 and value < high - size:
+            turns, direction, low = turns + (direction > 0), -1, value
+        elif direction <= 0 and value > low + size:
+            turns, direction, high = turns + (direction < 0), 1, value
+        low, high = min(low, value), max(high, value)
     return turns
 
 

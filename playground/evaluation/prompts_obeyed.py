@@ -36,16 +36,16 @@ class Prompt:
 
 
 PROMPTS: tuple[Prompt, ...] = (
-    Prompt("a person walks forward", 5.0, judges.walk_forward),
+    Prompt("a person walks forward for a while", 5.0, judges.walk_forward),
     Prompt("a person walks forward and turns left", 6.0, judges.turn_left),
     Prompt("a person walks forward and turns right", 6.0, judges.turn_right),
     Prompt("a person raises the left hand", 3.0, judges.raise_left_hand),
     Prompt("a person raises the right hand", 3.0, judges.raise_right_hand),
-    Prompt("a person runs forward", 3.0, judges.run),
+    Prompt("a person is running forward", 3.0, judges.run),
     Prompt("a person walks backwards", 5.0, judges.walk_backwards),
-    Prompt("a person waves with both hands", 3.0, judges.wave_both_hands),
-    Prompt("a person waves with the left hand", 3.0, judges.wave_left_hand, plain=False),
-    Prompt("a person waves with the right hand", 3.0, judges.wave_right_hand, plain=False),
+    Prompt("a person is waving with both hands", 3.0, judges.wave_both_hands),
+    Prompt("a person is waving with the left hand", 3.0, judges.wave_left_hand, plain=False),
+    Prompt("a person is waving with the right hand", 3.0, judges.wave_right_hand, plain=False),
     Prompt("a person kicks with one leg", 3.0, judges.kick, plain=False),
     Prompt("a person jumps up", 3.0, judges.jump, plain=False),
     Prompt("a person squats down and stands up again", 3.0, judges.squat, plain=False),
