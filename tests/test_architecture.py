@@ -15,7 +15,7 @@ PACKAGE = ROOT / "playground"
 
 # One row a floor, from the ground up; an import goes down or stays on its floor.
 FLOORS = (
-    {"errors", "limits"},
+    {"errors", "limits", "progress"},
     {"motion", "nn"},
     {"text", "data"},
     {"tokenizers"},
@@ -23,7 +23,7 @@ FLOORS = (
     {"checkpoints", "systems", "results", "runtime", "engine"},
     {"training", "evaluation", "analysis", "convert", "bench"},
     {"figures"},
-    {"ui", "cli", "commands", "progress", "__main__"},
+    {"ui", "cli", "commands", "__main__"},
 )
 HEAVY = {  # package -> where it may be imported
     "gradio": ("playground/ui/", "app.py"),

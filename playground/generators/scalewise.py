@@ -50,7 +50,7 @@ class GeneratorConfig:
 GENERATOR_PRESETS: dict[str, GeneratorConfig] = {
     "full": GeneratorConfig(),
     "lite": GeneratorConfig(
-        width=256, depth=6, heads=4, hidden=512, dropout=0.1, text_width=384, text_mask=True,
+        width=256, depth=6, heads=4, hidden=512, dropout=0.0, text_width=384, text_mask=True,
         scales=MID_SCALES, codes=linear_codes(128, 384, 10), code_width=192,
     ),
 }  # fmt: skip
