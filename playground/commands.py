@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import sys
 from pathlib import Path
 from typing import Any
@@ -27,9 +28,17 @@ def say(text: str) -> None:
 
 def app(host: str, port: int) -> None:
     """Serve the web app until it is stopped."""
+    try:
+        socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET).close()
+    except OSError as error:
+        raise PlaygroundError(
+            f"{host} port {port} cannot be used: {error.strerror}; --host and --port choose"
+        ) from error
     os.environ.setdefault("GRADIO_ANALYTICS_ENABLED", "False")  # read when gradio is imported
     from playground.ui.app import launch
 
+    say(f"starting the app on http://{host}:{port} (Ctrl+C stops it)")
+    sys.stdout.flush()
     launch(host, port)
 
 

@@ -17,6 +17,7 @@ from playground.data.library import Library
 from playground.engine import default_engine
 from playground.limits import LIMITS
 from playground.motion.formats import read_motion
+from tests.browser.server import serving
 from tests.conftest import drifting
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -182,17 +183,26 @@ def test_train_stops_and_goes_on(library: Path, folder: Path) -> None:
 
 
 def test_app_serves_the_page() -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    words = [sys.executable, "-u", "-m", "playground", "app", "--host", "127.0.0.1", "--port", str(port)]
-    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as server:
-        assert server.stdout is not None
-        try:
-            said = next((line for line in server.stdout if str(port) in line), None)
-            assert said, "the app ended without serving"
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=60) as answer:
-                assert "Motion Token Playground" in answer.read().decode("utf-8")
-        finally:
-            server.terminate()
-            server.stdout.read()
+    with serving("-m", "playground", "app", "--host", "127.0.0.1", "--port", "{port}") as address:
+        assert "Motion Token Playground" in page(address)
+
+
+def test_app_py_serves_the_page_where_the_host_says() -> None:
+    code = (
+        "import os, runpy; os.environ['GRADIO_SERVER_PORT'] = '{port}'; runpy.run_path('app.py', run_name='__main__')"
+    )
+    with serving("-c", code) as address:
+        assert "Motion Token Playground" in page(address)
+
+
+def test_an_address_that_cannot_be_used_is_one_line() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        _, err = call("app", "--port", taken.getsockname()[1], status=2)
+    assert len(err.splitlines()) == 1 and "--port" in err
+    _, err = call("app", "--host", "no such host", status=2)
+    assert len(err.splitlines()) == 1 and "--host" in err
+
+
+def page(address: str) -> str:
+    with urllib.request.urlopen(address, timeout=60) as answer:
+        return answer.read().decode("utf-8")
