@@ -19,6 +19,7 @@ from torch import Tensor, nn
 from playground.errors import PlaygroundError
 from playground.generators.scalewise import GeneratorConfig, ScalewiseTransformer, build_generator
 from playground.motion.representation import Normaliser
+from playground.nn.linear import pack
 from playground.text.features import EncoderId
 from playground.tokenizers.transformer import LGTok, TokenizerConfig, build_tokenizer
 
@@ -88,7 +89,9 @@ def _fill(model: Model, tensors: dict[str, Tensor], path: Path) -> Model:
     missing, unexpected = model.load_state_dict(weights, strict=False)
     if unexpected or any(name.rsplit(".", 1)[-1] not in TRAINING_ONLY for name in missing):
         raise PlaygroundError(f"the weights in {path} do not fit their own config; the file is damaged or too new")
-    return model.eval().requires_grad_(False)
+    model.eval().requires_grad_(False)
+    pack(model)
+    return model
 
 
 def _read(path: Path, kind: str | None = None, weights: bool = False) -> tuple[Card, dict[str, Tensor]]:

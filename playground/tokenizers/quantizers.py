@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from playground.nn.linear import Conv3
 from playground.nn.modules import module_list
 from playground.tokenizers.base import Quantized, Tokens
 
@@ -117,18 +118,17 @@ class Phi(nn.Module):
             raise ValueError(f"unknown phi {kind!r}; accepted: {', '.join(PHIS)}")
         self.kind = kind
         count = {"conv": 2, "residual": 1, "identity": 0}[kind]
-        self.convs = module_list(nn.Conv1d(width, width, 3, padding=1) for _ in range(count))
+        self.convs = module_list(Conv3(width, width) for _ in range(count))
 
     def forward(self, x: Tensor) -> Tensor:
         """x [B, T, D] -> [B, T, D]."""
         if self.kind == "identity":
             return x
-        y = x.transpose(1, 2)
         if self.kind == "residual":
-            return 0.5 * (x + self.convs[0](y).transpose(1, 2))
+            return 0.5 * (x + self.convs[0](x))
         for conv in self.convs:
-            y = F.relu(conv(y))
-        return y.transpose(1, 2)
+            x = conv(x, relu=True)
+        return x
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from playground.limits import LIMITS
 from playground.nn.attention import Memory
 from playground.nn.blocks import UStack
-from playground.nn.linear import Linear
+from playground.nn.linear import Conv3, Linear
 from playground.nn.rope import Rotation, rope_angles
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Quantized, Tokens
@@ -125,8 +125,8 @@ class LGTok(nn.Module):
         self.query_positions = nn.Parameter(torch.randn(self.frames, c.width) * c.width**-0.5)
         self.encoder = _build_stack(c, crossed_in)
         self.decoder = _build_stack(c, crossed_out)
-        self.to_code = nn.Conv1d(c.width, c.code_width, 3, padding=1)
-        self.from_code = nn.Conv1d(c.code_width, c.width, 3, padding=1)
+        self.to_code = Conv3(c.width, c.code_width)
+        self.from_code = Conv3(c.code_width, c.width)
         self.motion_out = Linear(c.width, c.patch * c.columns)
         self.quantizer = MultiScaleQuantizer(c.scales, c.codes, c.code_width, metric=c.metric, phi=c.phi)
         if c.positions == "learned":
@@ -217,7 +217,7 @@ class LGTok(nn.Module):
         out = self.encoder(sequence, self._rotation(positions), _join_masks(masks, parts), memories)
         first = parts[0].shape[1] if starts[0] == 0 else 0
         kept = out[:, first : first + c.latents]
-        return self.to_code(kept.transpose(1, 2)).transpose(1, 2)  # (B, T, code width)
+        return self.to_code(kept)  # (B, T, code width)
 
     @torch.no_grad()
     def encode(self, features: Tensor, lengths: Tensor, text: TextFeatures | None) -> Quantized:
@@ -235,7 +235,7 @@ class LGTok(nn.Module):
         """embedding [B, T, code width] -> features [B, F, C], or [2B, F, C] where the memory asks for a null branch."""
         c = self.config
         batch, frames = len(lengths), int(lengths.max())
-        latents = self.from_code(embedding.transpose(1, 2)).transpose(1, 2)
+        latents = self.from_code(embedding)
         tokens = self._patched(lengths)
         count = int(tokens.max())
         queries = (self.mask_vector + self.query_positions[:count]).to(latents.dtype).expand(batch, -1, -1)

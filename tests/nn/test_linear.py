@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from playground.nn.linear import Linear, linear
+from playground.nn.linear import Conv3, Linear, linear, pack
 
 
 @pytest.mark.parametrize("shape", [(2, 5), (1, 5), (3, 7, 5), (5,), (0, 5), (2, 3, 4, 5)])
@@ -38,3 +38,25 @@ def test_other_types_take_the_plain_road():
     torch.testing.assert_close(linear(x.double(), weight.double()), x.double() @ weight.double().T)
     with torch.autocast("cpu", torch.bfloat16):
         assert linear(x, weight).dtype == torch.bfloat16
+
+
+@pytest.mark.parametrize("relu", [False, True])
+@pytest.mark.parametrize("rows", [1, 2, 9])
+def test_packed_layers_equal_plain_ones(relu, rows):
+    torch.manual_seed(0)
+    layer, conv = Linear(6, 4).requires_grad_(False), Conv3(6, 4).requires_grad_(False)
+    x = torch.randn(3, rows, 6)
+    plain = layer(x), conv(x, relu=relu)
+    slow = torch.nn.functional.conv1d(x.transpose(1, 2).double(), conv.weight.double(), conv.bias.double(), padding=1)
+    slow = slow.transpose(1, 2).clamp(min=0) if relu else slow.transpose(1, 2)
+    torch.testing.assert_close(plain[1].double(), slow, atol=1e-5, rtol=1e-5)
+    pack(torch.nn.ModuleList([layer, conv]))
+    torch.testing.assert_close(layer(x), plain[0], atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(conv(x, relu=relu), plain[1], atol=1e-5, rtol=1e-5)
+    assert conv(x[:, ::2], relu=relu).shape == (3, (rows + 1) // 2, 4)
+    assert sorted(conv.state_dict()) == ["bias", "weight"]
+
+
+def test_only_a_frozen_model_is_packed():
+    with pytest.raises(ValueError, match="frozen"):
+        pack(Linear(2, 2))
