@@ -35,7 +35,7 @@ _MODULES = (
     "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "labels", "figures", "rows",
     "score", "timeline", "toolbar", "gestures", "keys", "notices", "stage", "index",
 )  # fmt: skip
-# The modules are fetched once a page, by the first stage that is shown. With stage_script() in its head a page has them.
+# The first stage that is shown fetches the modules, once a page; with stage_script() in its head a page has them.
 _ON_LOAD = """
 const start = () => {
   const options = JSON.parse(props.options);

@@ -12,6 +12,7 @@ import { locate, spanOf } from "./store.js";
 
 const WORDS = 44; // pixels under the figures that belong to their names
 const AIR = 10; // pixels above them
+const NAME = 116; // pixels that a name and its caption need
 const CROWD = 4; // figures from which on a narrow picture gets two rows
 const SMOOTH = 10; // frames on either side over which the followed point is averaged
 const REACHING = [ // joints that a body reaches farthest with
@@ -109,8 +110,9 @@ export class Figures {
     }
     const least = Math.min(2, Math.max(0.85, 1.3 * half));
     const { width, height } = this.camera;
-    const room = (tall * width) / Math.max(1, height - AIR - WORDS) / this.across;
-    return Math.max(least, Math.min(1.9, 0.95 * room));
+    const pixel = tall / Math.max(1, height - AIR - WORDS); // metres
+    const most = Math.max(1.9, NAME * pixel), room = (pixel * width) / this.across;
+    return Math.max(least, Math.min(most, 0.95 * room));
   }
 
   // The point that the camera follows at a frame: the first figure's way, smoothed; the origin when it does not follow.

@@ -237,13 +237,14 @@ export class Score {
 }
 
 function head(track, y) {
-  const scales = track.levels.length;
-  const tokens = track.levels.reduce((sum, level) => sum + (level.ids ? level.size : 0), 0);
+  const scales = track.levels.length, there = track.levels.filter((level) => level.ids);
+  const tokens = there.reduce((sum, level) => sum + level.size, 0);
+  const so = there.length < scales ? `${there.length} of ${scales}` : scales;
   const node = el(
     "div", { class: "ms-head", style: `top:${y}px` },
     el("i", { class: "ms-swatch" }),
     el("strong", { text: track.name }),
-    el("span", { text: `${tokens} tokens in ${scales} ${scales === 1 ? "scale" : "scales"}` }),
+    el("span", { text: `${tokens} tokens in ${so} ${scales === 1 ? "scale" : "scales"}` }),
   );
   if (track.levels.some((level) => level.entropy)) node.append(el("span", { text: "faint: unsure" }));
   if (track.note) node.append(el("span", { class: "ms-note", text: track.note, tabindex: "0" }));

@@ -33,10 +33,11 @@ export class Stage {
     const canvas = el("canvas", { class: "ms-canvas", role: "img", "aria-label": "No motion yet" });
     const labels = el("div", { class: "ms-labels" });
     const { badge, notice, progress, error, spoken } = (this.notices = new Notices(this.options.empty));
-    this.picture = el("div", { class: "ms-picture" }, canvas, labels, badge, notice, progress);
+    this.picture = el("div", { class: "ms-picture" }, canvas, labels, notice, progress);
     this.picture.style.height = `${this.options.height}px`;
     this.figures = new Figures(canvas, labels, this.store, this.camera);
     this.toolbar = new Toolbar(this.store, { onReset: () => this.resetView() });
+    this.toolbar.element.append(badge); // in a corner of the picture, or among the controls on a phone
     this.timeline = new Timeline(this.store, () => this.data);
     this.score = new Score(this.store, { onView: (view) => this.setView(view) });
     this.scorePart = el("div", { class: "ms-score ms" }, this.timeline.element, this.score.element);
