@@ -55,8 +55,8 @@ train: $(DEV) ## train SYSTEM_NAME: its tokenizer, then its generator; goes on w
 bench: $(RUNTIME) ## measure speed and memory
 	$(BIN)/python -m playground bench
 
-screenshots: $(DEV) $(SYSTEM) ## photograph every room of the running app into assets/screenshots
-	$(BIN)/python benchmarks/screenshots.py
+screenshots: $(DEV) $(SYSTEM) ## photograph every room of the app into screenshots/
+	$(BIN)/python -m tests.browser.screenshots
 
 clean: ## remove caches; the virtual environment, libraries and runs stay
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis build

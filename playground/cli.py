@@ -170,6 +170,10 @@ def _for_data(command: Command) -> None:
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="checkpoints and logs")
     sub.add_argument("--resume", action="store_true", help="go on from the last checkpoint in --out, if there is one")
     sub.add_argument("--steps", type=int, help="other than the run's own number of steps")
+    sub.add_argument(
+        "--devices", type=int, help="GPUs or processes to use (default: all GPUs; torchrun decides itself)"
+    )
+    sub.add_argument("--precision", choices=("auto", "bf16-mixed", "16-mixed", "32-true"), default="auto")
 
     sub = command("evaluate", commands.evaluate, "measure a system on one split of a library")
     sub.add_argument("system", metavar="SYSTEM")

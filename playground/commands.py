@@ -124,12 +124,18 @@ def prepare(source: str, root: Path | None, out: Path) -> None:
     say(f"{out}: {prepared.clips} clips")
 
 
-def train(config: str, library: Path, out: Path, resume: bool, steps: int | None) -> None:
+def train(
+    config: str, library: Path, out: Path, resume: bool, steps: int | None, devices: int | None, precision: str
+) -> None:
     """Train a tokenizer or a generator."""
+    if devices is not None and devices < 1:
+        raise PlaygroundError(f"--devices is {devices}; at least 1 is needed")
     Library.open(library)
-    from playground.training import run
+    from playground.training.loop import Launch
+    from playground.training.run import train
 
-    run.train(config, library, out, resume=resume, steps=steps)
+    launch = Launch(devices=devices or "auto", precision=precision)
+    train(config, library, out, resume=resume, steps=steps, launch=launch)
 
 
 def evaluate(system: str, library: Path, split: str, to: Path | None) -> None:

@@ -83,6 +83,8 @@ BAD_CALLS = {
     "train on no library": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run"],
     "train without a library": ["train", "lgtok-lite-tokenizer", "--out", "run"],
     "train for no steps": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--steps", "many"],
+    "train on no devices": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--devices", "0"],
+    "train with odd precision": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--precision", "8"],
     "evaluate an unknown system": ["evaluate", "gpt", "--library", "lib"],
     "evaluate on no library": ["evaluate", "lgtok-lite", "--library", "."],
     "evaluate an unknown split": ["evaluate", "lgtok-lite", "--library", "lib", "--split", "dev"],
