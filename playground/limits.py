@@ -24,6 +24,8 @@ class Limits:
     max_json_bytes: int = 2 * 1024 * 1024  # size of a token file
     max_figures: int = 6  # figures on one stage
     queue_size: int = 20  # visitors waiting for the model
+    sessions: int = 200  # visitors whose open motion is kept in memory
+    session_seconds: int = 3_600  # how long it is kept, and an uploaded file too
     deadline_seconds: float = 30.0  # one live request, checked at every scale
 
 

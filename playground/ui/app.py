@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 TITLE = "Motion Token Playground"
 UPLOADS_CHECKED_EVERY = 600  # seconds between looks for old uploaded files
-UPLOADS_KEPT = 3600  # seconds an uploaded file is kept
 
 
 @lru_cache(maxsize=1)
@@ -38,7 +37,7 @@ def _default_engine() -> "Engine":
 def build(engine: EngineSource = _default_engine) -> gr.Blocks:
     """The page. `engine` is called when something needs it first; a test passes its own."""
     services = Services(engine)
-    with gr.Blocks(title=TITLE, delete_cache=(UPLOADS_CHECKED_EVERY, UPLOADS_KEPT), fill_width=True) as page:
+    with gr.Blocks(title=TITLE, delete_cache=(UPLOADS_CHECKED_EVERY, LIMITS.session_seconds), fill_width=True) as page:
         gr.HTML(_header(), elem_id="mtp-header", apply_default_css=False, js_on_load="window.mtpHeader?.(element);")
         with gr.Tabs(elem_id="mtp-rooms", overflow_behavior="wrap"):
             for label, room in ROOMS.items():
@@ -58,6 +57,7 @@ def launch(host: str = "127.0.0.1", port: int = 7860, engine: EngineSource = _de
         theme=theme(),
         head=_head(),
         max_file_size=LIMITS.max_upload_bytes,
+        state_session_capacity=LIMITS.sessions,
         footer_links=[],
         show_error=True,
         ssr_mode=False,

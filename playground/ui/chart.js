@@ -107,13 +107,12 @@
       picked = event.detail.id;
       redraw();
     });
-    let width = 0;
+    let width = 0; // the observer also speaks once at the start, and when a hidden tab is opened
     new ResizeObserver(() => {
       if (box.clientWidth === width) return;
       width = box.clientWidth;
       redraw();
     }).observe(box);
     new MutationObserver(redraw).observe(document.body, { attributes: true, attributeFilter: ['class'] });
-    redraw();
   };
 })();

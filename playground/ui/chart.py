@@ -9,10 +9,11 @@ from pathlib import Path
 
 import gradio as gr
 
-_TEMPLATE = (
-    '<figure class="mtp-figure"><figcaption ${titled ? "" : "hidden"}>${label}</figcaption>'
-    '<div class="mtp-chart" role="img" aria-label="${label}" style="height:${height}px"></div></figure>'
-)
+_TEMPLATE = """
+<figure class="mtp-figure"><figcaption ${titled ? "" : "hidden"}>${label}</figcaption>
+<div class="mtp-chart" role="img" aria-label="${label}" style="height:${height}px;min-width:${narrowest}px"></div>
+</figure>
+"""
 _START = """
 const start = () => window.mtpChart ? window.mtpChart(element, props, trigger, watch) : requestAnimationFrame(start);
 start();  // triggers 'pick' with {id} when a point is clicked
@@ -32,10 +33,19 @@ def chart_script() -> str:
     return (Path(__file__).parent / "chart.js").read_text(encoding="utf-8")
 
 
-def chart(value: str | None = None, *, label: str, height: int, elem_id: str = "", show_label: bool = False) -> gr.HTML:
+def chart(
+    value: str | None = None,
+    *,
+    label: str,
+    height: int,
+    elem_id: str = "",
+    show_label: bool = False,
+    narrowest: int = 0,
+) -> gr.HTML:
     """One chart. Its value is a Plotly figure as JSON text (`figure.to_json()`), or None for an empty place.
 
     label is read out to people who do not see the chart, and stands above it with show_label; height in pixels.
+    Where the page is narrower than `narrowest` pixels, the chart scrolls sideways inside itself.
     `chart.pick(handler)` is called with event data whose `id` is the customdata of the clicked point.
     """
     return gr.HTML(
@@ -48,5 +58,6 @@ def chart(value: str | None = None, *, label: str, height: int, elem_id: str = "
         elem_classes=["mtp-chart-block"],
         height=height,
         titled=show_label,
+        narrowest=narrowest,
         plotly_url=f"gradio_api/file={plotly_script()}",
     )

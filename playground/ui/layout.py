@@ -10,7 +10,6 @@ from playground.ui.facts import text_file
 from playground.ui.stage.component import score_slot, stage_component
 from playground.ui.view import View
 
-LEAVE_AFTER = 3600  # seconds after which what a visitor had open is forgotten
 FIGURES_HEIGHT = 392  # CSS pixels; with player and score a room's first look fits 1280x720
 
 

@@ -9,3 +9,9 @@ window.mtpHeader = (element) => {
     localStorage.setItem(key, body.classList.toggle('dark') ? '1' : '0');
   });
 };
+
+/* The file picker starts with what can be read; anything else is answered by the server in a sentence. */
+document.addEventListener('click', (event) => {
+  const button = event.target.closest?.('#tokenize-upload');
+  if (button) button.parentElement.querySelector('input[type=file]')?.setAttribute('accept', '.bvh,.npy,.npz');
+}, true);

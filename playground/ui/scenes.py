@@ -55,7 +55,7 @@ def clip_scene(
     system: "SystemInfo", motion: Motion, levels: Sequence[Any], palettes: Sequence[Any] | None, name: str, note: str
 ) -> Json:
     """One motion decoded from stored tokens; `note` says so under its name."""
-    shown = scene.figure("clip", name.capitalize(), motion.joints, system.name, note)
+    shown = scene.figure("clip", name[:1].upper() + name[1:], motion.joints, system.name, note)
     return scene.payload([shown], [score(system, motion.frames, levels, palettes)])
 
 
@@ -75,7 +75,7 @@ def guidance_scene(
 ) -> Json:  # fmt: skip
     """One motion at the slider's guidance and at five fixed ones, all recovered in the browser from both decodes."""
     frames = len(pair.conditional)
-    figures = [scene.figure("live", "Your g", None, system.name, g="live", frames=frames)]
+    figures = [scene.figure("live", "Your g", None, system.name, "follows the slider", g="live", frames=frames)]
     for g in FIXED_GUIDANCE:
         figures.append(scene.figure(f"g{g}", f"g = {g}", None, system.name, g=g, frames=frames))
     features = scene.features("live", pair.conditional, pair.unconditional, pair.mean, pair.std, guidance)

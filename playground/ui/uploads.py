@@ -41,7 +41,7 @@ def read_upload(path: str | None) -> Source:
         raise PlaygroundError(f"no file arrived; choose a {_listed(SUFFIXES)} file of at most {_megabytes()} MB")
     file = Path(path)
     if file.suffix.lower() not in SUFFIXES:
-        raise PlaygroundError(f"{_short(file.name)} is no motion file; {_listed(SUFFIXES)} are accepted")
+        raise PlaygroundError(f"the file {_short(file.name)} is no motion; {_listed(SUFFIXES)} are accepted")
     from playground.motion.formats import read_motion
 
     read = read_motion(file)

@@ -84,9 +84,9 @@ def room(services: Services) -> None:
     with room_frame("codebooks"):
         with gr.Column(elem_classes=["mtp-main"], min_width=0):
             plot = chart(opening.charts.get("sorted"), label="How often each code is used, one panel a scale",
-                         height=PANELS, elem_id="codebooks-panels")  # fmt: skip
+                         height=PANELS, elem_id="codebooks-panels", narrowest=820)  # fmt: skip
             chart(opening.charts.get("summary"), label="Share of codes used and perplexity, by scale", height=SUMMARY,
-                  elem_id="codebooks-summary")  # fmt: skip
+                  elem_id="codebooks-summary", narrowest=560)  # fmt: skip
         with panel("Which codes are used", LEAD):
             order = gr.Radio(ORDERS, value="sorted", label="Order of the codes", elem_id="codebooks-order")
             message = message_place("codebooks-message")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from playground.engine import SystemInfo
 
 NAME = "embedding-map"
+STAGE = "embedding"
 LEAD = (
     "Each point is one recorded motion, placed by what its tokens mean to the decoder. Click one and it steps on the "
     "stage. Do its neighbours move alike?"
@@ -108,11 +109,35 @@ def about(bundle: Bundle) -> str:
     return f'<p class="mtp-aside">{html.escape(f"{bundle.provenance}. {shared}.")}</p>'
 
 
+class Handlers:
+    """What a click on the map and a choice among the neighbours do."""
+
+    def __init__(self, services: Services) -> None:
+        self.services = services
+
+    def put(self, wanted: object) -> tuple[Any, ...]:
+        """The clip of that id on the stage, its numbers, its neighbours."""
+        system = self.services.default_system()
+        bundle = self.services.bundle(system.name)
+        view = show(self.services, system, bundle, bundle.position(str(wanted)))
+        return view.stage_json(), view.facts_html(), gr.update(choices=view.controls["near"], value=None)
+
+    def click(self, event: gr.EventData) -> tuple[Any, ...]:
+        """A point of a map."""
+        return self.put(event.id)
+
+    def step(self, wanted: str | None) -> tuple[Any, ...]:
+        """One of the neighbours."""
+        if wanted is None:
+            raise PlaygroundError("choose one of the neighbours")
+        return self.put(wanted)
+
+
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    with room_frame("embedding"):
-        stage = stage_and_score("embedding", opening)
+    with room_frame(STAGE):
+        stage = stage_and_score(STAGE, opening)
         with panel("A map of motions", LEAD):
             plot = chart(
                 opening.charts.get("maps"), label="Two maps of the same motions", height=HEIGHT, elem_id="embedding-map"
@@ -126,27 +151,14 @@ def room(services: Services) -> None:
                 elem_id="embedding-near",
             )
             gr.HTML(opening.controls.get("about", ""), elem_id="embedding-about", apply_default_css=False)
-        words("embedding-map")
-
-    def put(wanted: object) -> tuple[Any, ...]:
-        system = services.default_system()
-        bundle = services.bundle(system.name)
-        view = show(services, system, bundle, bundle.position(str(wanted)))
-        return view.stage_json(), view.facts_html(), gr.update(choices=view.controls["near"], value=None)
-
-    def click(event: gr.EventData) -> tuple[Any, ...]:
-        return put(event.id)
-
-    def step(wanted: str | None) -> tuple[Any, ...]:
-        if wanted is None:
-            raise PlaygroundError("choose one of the neighbours")
-        return put(wanted)
-
+        words(NAME)
+    do = Handlers(services)
     shown = [stage, facts, near]
-    attach(plot.pick, click, [], shown, message, stage="embedding", doing=DOING, trigger_mode="always_last")
+    attach(plot.pick, do.click, [], shown, message, stage=STAGE, doing=DOING, trigger_mode="always_last")
     near.input(None, [near], None, js=RING, api_visibility="private")
-    attach(near.input, step, [near], shown, message, stage="embedding", doing=DOING)
+    attach(near.input, do.step, [near], shown, message, stage=STAGE, doing=DOING)
 
 
 def _near(bundle: Bundle, row: int) -> list[tuple[str, str]]:
-    return [(label_of(bundle, other), bundle.clips[other].id) for other in neighbours(bundle, row)]
+    rows = neighbours(bundle, row)
+    return [(bundle.clips[other].caption or bundle.clips[other].action, bundle.clips[other].id) for other in rows]

@@ -12,7 +12,7 @@ from playground.limits import LIMITS
 from playground.text.prompts import normalise
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.facts import Fact, significant
-from playground.ui.layout import LEAVE_AFTER, panel, room_frame, stage_and_score, words
+from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.scenes import generated_scene, token_facts
 from playground.ui.services import Services
 from playground.ui.stage.component import stage_call
@@ -27,6 +27,7 @@ PROMPTS = (
     "a person turns left while walking",
     "a person waves with both hands",
 )
+OPENING_SECONDS = 5.0
 DOING = "Choosing the first tokens"
 ENTROPY_CARD = (
     "How undecided the generator was, on average over its tokens: at 0 bit one code was certain, at 3 bit it was like "
@@ -99,62 +100,76 @@ def entropy_fact(entropy: Sequence[Any]) -> Fact:
 
 
 def opening_view(services: Services) -> View:
-    """The room's first result: the first prompt, seed 0, four seconds."""
-    *_, last = stream(services, Wish.checked(PROMPTS[0], False, 4.0, 0, 2.0, 4.0, 1.0, 0.2, 0.95))
+    """The room's first result: the first prompt, seed 0."""
+    *_, last = stream(services, Wish.checked(PROMPTS[0], False, OPENING_SECONDS, 0, 2.0, 4.0, 1.0, 0.2, 0.95))
     return last
+
+
+class Handlers:
+    """What the controls do."""
+
+    def __init__(self, services: Services) -> None:
+        self.services = services
+
+    def generate(self, *values: Any) -> Iterator[tuple[Any, ...]]:
+        """Stage, facts and progress after every scale."""
+        for view in stream(self.services, Wish.checked(*values)):
+            level, count = view.controls["level"], view.controls["count"]
+            note = f"Choosing tokens: scale {level} of {count} is done." if level < count else ""
+            yield Noted(view.stage_json(), note), view.facts_html(), Progress(level, count)
+
+    def stopped(self, made: Progress | None) -> tuple[Any, ...]:
+        """What is said after "Stop"; the stage keeps what it has."""
+        done = made or Progress()
+        text = f"Stopped; this is the motion after scale {done.level} of {done.count}."
+        return (Noted(gr.skip(), text if 0 < done.level < done.count else "Stopped before the first scale was done."),)
 
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    progress = gr.State(Progress(), time_to_live=LEAVE_AFTER)
-    with room_frame("generate"):
-        stage = stage_and_score("generate", opening)
+    progress = gr.State(Progress(), time_to_live=LIMITS.session_seconds)
+    with room_frame(NAME):
+        stage = stage_and_score(NAME, opening)
         with panel("Words become a motion", LEAD):
-            prompt = gr.Textbox(
-                opening.controls.get("prompt", PROMPTS[0]), label="Prompt", lines=2, max_lines=3,
-                placeholder=PROMPTS[0], elem_id="generate-prompt",
-            )  # fmt: skip
-            gr.Examples([[text] for text in PROMPTS], [prompt], label="Try one of these", elem_id="generate-examples")
-            with gr.Row(elem_classes=["mtp-line"]):
-                seconds = gr.Slider(
-                    LIMITS.min_seconds, LIMITS.max_seconds, value=4.0, step=0.2, label="Seconds",
-                    elem_id="generate-seconds", min_width=160,
-                )  # fmt: skip
-                seed = gr.Number(
-                    0, label="Seed", precision=0, minimum=0, maximum=LIMITS.max_seed, elem_id="generate-seed",
-                    min_width=80, scale=0,
-                )  # fmt: skip
-            with gr.Row(elem_classes=["mtp-line"]):
-                go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
-                cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
+            prompt, seconds, seed, go, cancel = _controls(opening)
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
-            knobs = _knobs()
-        words("generate")
-
-    def generate(*values: Any) -> Iterator[tuple[Any, ...]]:
-        for view in stream(services, Wish.checked(*values)):
-            level, count = view.controls["level"], view.controls["count"]
-            note = f"Choosing tokens: scale {level} of {count} is done." if level < count else ""
-            yield Noted(view.stage_json(), note), view.facts_html(), Progress(level, count)
-
-    def stopped(made: Progress | None) -> tuple[Any, ...]:
-        done = made or Progress()
-        text = f"Stopped; this is the motion after scale {done.level} of {done.count}."
-        return (Noted(gr.skip(), text if 0 < done.level < done.count else "Stopped before the first scale was done."),)
-
-    free, *numbers = knobs
+            free, *numbers = _knobs()
+        words(NAME)
+    do = Handlers(services)
     inputs = [prompt, free, seconds, seed, *numbers]
     runs = []
     for event in (go.click, prompt.submit):
         busy = event(_switch(True), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
-        run = attach(busy.then, generate, inputs, [stage, facts, progress], message, stage=NAME, doing=DOING)
+        run = attach(busy.then, do.generate, inputs, [stage, facts, progress], message, stage=NAME, doing=DOING)
         run.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
         runs.append(run)
-    halt = attach(cancel.click, stopped, [progress], [stage], message, cancels=runs, model=False)
+    halt = attach(cancel.click, do.stopped, [progress], [stage], message, cancels=runs, model=False)
     halt.then(None, None, None, js=stage_call(NAME, "say", "ready"), api_visibility="private")
     halt.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
+
+
+def _controls(opening: View) -> tuple[Any, ...]:
+    """The controls from top to bottom: prompt, seconds, seed, "Generate", "Stop"."""
+    prompt = gr.Textbox(
+        opening.controls.get("prompt", PROMPTS[0]), label="Prompt", lines=2, max_lines=3,
+        placeholder=PROMPTS[0], elem_id="generate-prompt",
+    )  # fmt: skip
+    gr.Examples([[text] for text in PROMPTS], [prompt], label="Try one of these", elem_id="generate-examples")
+    with gr.Row(elem_classes=["mtp-line"]):
+        seconds = gr.Slider(
+            LIMITS.min_seconds, LIMITS.max_seconds, value=OPENING_SECONDS, step=0.2, label="Seconds",
+            elem_id="generate-seconds", min_width=160,
+        )  # fmt: skip
+        seed = gr.Number(
+            0, label="Seed", precision=0, minimum=0, maximum=LIMITS.max_seed, elem_id="generate-seed",
+            min_width=80, scale=0,
+        )  # fmt: skip
+    with gr.Row(elem_classes=["mtp-line"]):
+        go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
+        cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
+    return prompt, seconds, seed, go, cancel
 
 
 def _switch(running: bool) -> Any:

@@ -24,6 +24,7 @@ DIFFERENCE = (
     "their reading changes."
 )
 FIRST = 2.0
+FORMULA = '<p class="mtp-formula">m = (1 + g) · m<sub>words</sub> − g · m<sub>wordless</sub></p>'
 DOING = "Decoding twice"
 
 
@@ -47,14 +48,30 @@ def opening_view(services: Services) -> View:
     return run(services, example.id, example.caption)
 
 
+class Handlers:
+    """What the controls do; the slider is not among them, it works in the browser."""
+
+    def __init__(self, services: Services) -> None:
+        self.services = services
+
+    def choose(self, wanted: str, at: float) -> tuple[Any, ...]:
+        """Another motion, with its own caption."""
+        return self.again(wanted, self.services.example(wanted).caption, at)
+
+    def again(self, wanted: str, text: str, at: float) -> tuple[Any, ...]:
+        """The same motion with another caption."""
+        view = run(self.services, wanted, text, checked_number(at, "g", 0, LIMITS.max_guidance))
+        return view.stage_json(), view.facts_html(), view.controls["caption"]
+
+
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    with room_frame("guidance"):
-        stage = stage_and_score("guidance", opening)
+    with room_frame(NAME):
+        stage = stage_and_score(NAME, opening)
         with panel("What g does", LEAD):
-            g = gr.Slider(0, LIMITS.max_guidance, FIRST, step=0.05, label="g", elem_id="guidance-g")
-            gr.HTML('<p class="mtp-formula">m = (1 + g) · m<sub>words</sub> − g · m<sub>wordless</sub></p>')
+            g = gr.Slider(0, LIMITS.max_guidance, FIRST, step=0.05, label="Guidance g", elem_id="guidance-g")
+            gr.HTML(FORMULA, apply_default_css=False)
             example = gr.Dropdown(
                 services.example_choices(),
                 value=opening.controls.get("example"),
@@ -70,17 +87,10 @@ def room(services: Services) -> None:
             message = message_place("guidance-message")
             facts = gr.HTML(opening.facts_html(), elem_id="guidance-facts", apply_default_css=False)
             gr.HTML(f'<p class="mtp-aside">{DIFFERENCE}</p>', apply_default_css=False)
-        words("guidance")
-
-    def choose(wanted: str, at: float) -> tuple[Any, ...]:
-        return again(wanted, services.example(wanted).caption, at)
-
-    def again(wanted: str, text: str, at: float) -> tuple[Any, ...]:
-        view = run(services, wanted, text, checked_number(at, "g", 0, LIMITS.max_guidance))
-        return view.stage_json(), view.facts_html(), view.controls["caption"]
-
+        words(NAME)
+    do = Handlers(services)
     shown = [stage, facts, caption]
-    attach(example.input, choose, [example, g], shown, message, stage="guidance", doing=DOING)
+    attach(example.input, do.choose, [example, g], shown, message, stage=NAME, doing=DOING)
     for event in (caption.submit, go.click):
-        attach(event, again, [example, caption, g], shown, message, stage="guidance", doing=DOING)
-    g.change(None, [g], None, js=stage_call("guidance", "setGuidance"), api_visibility="private")
+        attach(event, do.again, [example, caption, g], shown, message, stage=NAME, doing=DOING)
+    g.change(None, [g], None, js=stage_call(NAME, "setGuidance"), api_visibility="private")

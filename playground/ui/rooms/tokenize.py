@@ -9,12 +9,13 @@ import gradio as gr
 from playground.analysis.residual import ScaleEnergy
 from playground.errors import PlaygroundError
 from playground.figures.residual import residual_bars
+from playground.limits import LIMITS
 from playground.ui.chart import chart
 from playground.ui.errors import Noted, attach, message_place
-from playground.ui.layout import LEAVE_AFTER, panel, room_frame, stage_and_score, words
+from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.scenes import error_fact, token_facts, tokenized_scene
 from playground.ui.services import Services
-from playground.ui.uploads import SUFFIXES, Source, read_upload
+from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
 
 if TYPE_CHECKING:
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
 
 NAME = "tokenize"
 LEAD = (
-    "Left, the motion. Below, the same motion as tokens: one row a scale, coarse on top. Right, what comes back from "
-    "those tokens alone."
+    "Left, a motion. Below, the same motion as tokens, one row a scale. Right, what comes back from the tokens alone. "
+    "Drag the slider to drop fine scales."
 )
 CHART_HEIGHT = 104
-ENERGY = "Energy still missing after 0, 1, 2 ... scales; click a bar to stop there"
+ENERGY = "% of energy missing after each scale; click a bar to stop there"
+UPLOADED = "uploaded"  # the menu's entry for the visitor's own file
 DOING = "Tokenizing"
 MARK_SCALES = """(n) => {
   const stage = window.MotionStage?.get('tokenize');
@@ -39,18 +41,21 @@ MARK_SCALES = """(n) => {
 class Session:
     """What one visitor is looking at. Without a `source` it is the stored opening, known by its example id."""
 
-    example: str = ""
+    example: str = ""  # id of an example, or UPLOADED
     source: Source | None = None
-    start: float = 0.0
+    start: float = 0.0  # second at which the window begins
     caption: str = ""
     tokenized: "Tokenized | None" = None
+    upload: Source | None = None  # stays in the menu when an example is chosen
 
 
 def open_session(services: Services, session: Session | None, opening: View) -> Session:
     """The session with its source loaded; a forgotten or fresh one starts at the opening example."""
     found = session or Session()
     if found.source is None:
-        wanted = found.example or str(opening.controls["example"])
+        wanted = found.example or str(opening.controls.get("example", ""))
+        if not wanted:
+            raise PlaygroundError("choose a motion or upload one first")
         example = services.example(wanted)
         found = replace(found, example=wanted, source=Source(example.motion(), example.title))
         found.caption = found.caption or str(opening.controls["caption"])
@@ -96,36 +101,68 @@ def opening_view(services: Services) -> View:
     return run(services, session)[1]
 
 
+class Handlers:
+    """What the controls do. Each returns the values of `everything` in `room`, or of its first four."""
+
+    def __init__(self, services: Services, opening: View) -> None:
+        self.services = services
+        self.opening = opening
+
+    def choose(self, wanted: str, held: Session | None) -> tuple[Any, ...]:
+        """Another motion of the menu, with its own caption."""
+        upload = held.upload if held else None
+        if wanted == UPLOADED and upload is not None:
+            return self._show(Session(UPLOADED, upload, upload=upload))
+        found = self.services.example(wanted)
+        return self._show(Session(wanted, Source(found.motion(), found.title), 0.0, found.caption, upload=upload))
+
+    def bring(self, path: str | None) -> tuple[Any, ...]:
+        """A file of the visitor's own, without a caption at first."""
+        source = read_upload(path)
+        session = Session(UPLOADED, source, upload=source)
+        return self._show(session, note=f"{source.title}: {source.note}")
+
+    def again(self, text: str, held: Session | None) -> tuple[Any, ...]:
+        """The same motion with another caption."""
+        held = open_session(self.services, held, self.opening)
+        return self._show(replace(held, caption=text or "", tokenized=None))
+
+    def move(self, second: float, held: Session | None) -> tuple[Any, ...]:
+        """Another window of a long motion."""
+        held = open_session(self.services, held, self.opening)
+        return self._show(replace(held, start=float(second), tokenized=None))
+
+    def rebuild(self, used: float, held: Session | None) -> tuple[Any, ...]:
+        """The same tokens, fewer or more scales."""
+        held, view = run(self.services, open_session(self.services, held, self.opening), int(used))
+        return held, view.stage_json(), view.facts_html(), view.charts["energy"]
+
+    def stop_at(self, held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
+        """A click on bar n: scales 1 to n."""
+        used = max(1, int(event.id))
+        return (*self.rebuild(used, held), used)
+
+    def _show(self, session: Session, note: str = "") -> tuple[Any, ...]:
+        held, view = run(self.services, session)
+        source = held.source
+        assert source is not None
+        own = [(f"{held.upload.title} · yours", UPLOADED)] if held.upload else []
+        menu = gr.update(choices=[*own, *self.services.example_choices()], value=held.example)
+        last = max(0.1, round(source.last_start, 1))
+        window = gr.update(visible=source.is_long, maximum=last, value=held.start)
+        steps = gr.update(maximum=max(2, view.controls["count"]), value=view.controls["scales"])
+        stage = Noted(view.stage_json(), note)
+        return held, stage, view.facts_html(), view.charts["energy"], menu, held.caption, window, steps
+
+
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    session = gr.State(Session(), time_to_live=LEAVE_AFTER)
-    with room_frame("tokenize"):
-        stage = stage_and_score("tokenize", opening)
+    session = gr.State(Session(), time_to_live=LIMITS.session_seconds)
+    with room_frame(NAME):
+        stage = stage_and_score(NAME, opening)
         with panel("A motion becomes tokens, and comes back", LEAD):
-            with gr.Row(elem_classes=["mtp-line"]):
-                example = gr.Dropdown(
-                    services.example_choices(), value=opening.controls.get("example"), label="Motion",
-                    elem_id="tokenize-example", scale=1, min_width=160,
-                )  # fmt: skip
-                upload = gr.UploadButton(
-                    "Upload", file_types=list(SUFFIXES), file_count="single", size="sm", scale=0, min_width=84,
-                    elem_id="tokenize-upload",
-                )  # fmt: skip
-            with gr.Row(elem_classes=["mtp-line"]):
-                caption = gr.Textbox(
-                    opening.controls.get("caption", ""), label="Caption (the tokenizer reads it; may be empty)",
-                    max_lines=1, elem_id="tokenize-caption", scale=1, min_width=160,
-                )  # fmt: skip
-                go = gr.Button("Tokenize", variant="primary", size="sm", scale=0, min_width=84, elem_id="tokenize-go")
-            start = gr.Slider(
-                0, 1, value=0, step=0.1, visible=False, elem_id="tokenize-start",
-                label="This motion is longer than 9.8 s; the window that is tokenized starts at second",
-            )  # fmt: skip
-            count = int(opening.controls.get("count", 1))
-            scales = gr.Slider(
-                1, max(count, 2), value=count, step=1, label="Rebuild from scales 1 to", elem_id="tokenize-scales"
-            )
+            example, upload, caption, go, start, scales = _controls(services, opening)
             message = message_place("tokenize-message")
             facts = gr.HTML(opening.facts_html(), elem_id="tokenize-facts", apply_default_css=False)
             energy = chart(
@@ -135,52 +172,42 @@ def room(services: Services) -> None:
                 elem_id="tokenize-energy",
                 show_label=True,
             )
-        words("tokenize")
-
-    def show(held: Session, view: View, note: str = "") -> tuple[Any, ...]:
-        assert held.source is not None
-        window = gr.update(
-            visible=held.source.is_long, maximum=max(0.1, round(held.source.last_start, 1)), value=held.start
-        )
-        steps = gr.update(maximum=max(2, view.controls["count"]), value=view.controls["scales"])
-        chosen = held.example or None
-        return (
-            held, Noted(view.stage_json(), note), view.facts_html(), view.charts["energy"], chosen, held.caption,
-            window, steps,
-        )  # fmt: skip
-
-    def choose(wanted: str) -> tuple[Any, ...]:
-        found = services.example(wanted)
-        held = Session(wanted, Source(found.motion(), found.title), 0.0, found.caption)
-        return show(*run(services, held))
-
-    def bring(path: str | None) -> tuple[Any, ...]:
-        source = read_upload(path)
-        return show(*run(services, Session(source=source)), note=f"{source.title}: {source.note}")
-
-    def again(text: str, held: Session | None) -> tuple[Any, ...]:
-        held = open_session(services, held, opening)
-        return show(*run(services, replace(held, caption=text or "", tokenized=None)))
-
-    def move(second: float, held: Session | None) -> tuple[Any, ...]:
-        held = open_session(services, held, opening)
-        return show(*run(services, replace(held, start=float(second), tokenized=None)))
-
-    def rebuild(used: float, held: Session | None) -> tuple[Any, ...]:
-        held, view = run(services, open_session(services, held, opening), int(used))
-        return held, view.stage_json(), view.facts_html(), view.charts["energy"]
-
-    def stop_at(held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
-        used = max(1, int(event.id))
-        return (*rebuild(used, held), used)
-
+        words(NAME)
+    do = Handlers(services, opening)
     parts = [session, stage, facts, energy]
     everything = [*parts, example, caption, start, scales]
-    attach(example.input, choose, [example], everything, message, stage="tokenize", doing=DOING)
-    attach(upload.upload, bring, [upload], everything, message, stage="tokenize", doing=DOING)
+    attach(example.input, do.choose, [example, session], everything, message, stage=NAME, doing=DOING)
+    attach(upload.upload, do.bring, [upload], everything, message, stage=NAME, doing=DOING)
     for event in (caption.submit, go.click):
-        attach(event, again, [caption, session], everything, message, stage="tokenize", doing=DOING)
-    attach(start.input, move, [start, session], everything, message, trigger_mode="always_last")
+        attach(event, do.again, [caption, session], everything, message, stage=NAME, doing=DOING)
+    attach(start.input, do.move, [start, session], everything, message, trigger_mode="always_last")
     scales.change(None, [scales], None, js=MARK_SCALES, api_visibility="private")
-    attach(scales.input, rebuild, [scales, session], parts, message, trigger_mode="always_last")
-    attach(energy.pick, stop_at, [session], [*parts, scales], message, trigger_mode="always_last")
+    attach(scales.input, do.rebuild, [scales, session], parts, message, trigger_mode="always_last")
+    attach(energy.pick, do.stop_at, [session], [*parts, scales], message, trigger_mode="always_last")
+
+
+def _controls(services: Services, opening: View) -> tuple[Any, ...]:
+    """The controls from top to bottom: motion, upload, caption, button, window, scales."""
+    with gr.Row(elem_classes=["mtp-line"]):
+        example = gr.Dropdown(
+            services.example_choices(), value=opening.controls.get("example"), label="Motion",
+            elem_id="tokenize-example", scale=1, min_width=160,
+        )  # fmt: skip
+        upload = gr.UploadButton(
+            "Upload", file_count="single", size="sm", scale=0, min_width=84, elem_id="tokenize-upload"
+        )
+    with gr.Row(elem_classes=["mtp-line"]):
+        caption = gr.Textbox(
+            opening.controls.get("caption", ""), label="Caption (the tokenizer reads it; may be empty)",
+            max_lines=1, elem_id="tokenize-caption", scale=1, min_width=160,
+        )  # fmt: skip
+        go = gr.Button("Tokenize", variant="primary", size="sm", scale=0, min_width=84, elem_id="tokenize-go")
+    start = gr.Slider(
+        0, 1, value=0, step=0.1, visible=False, elem_id="tokenize-start",
+        label="The 9.8 s that are tokenized start at second",
+    )  # fmt: skip
+    count = int(opening.controls.get("count", 1))
+    scales = gr.Slider(
+        1, max(count, 2), value=count, step=1, label="Rebuild from scales 1 to", elem_id="tokenize-scales"
+    )
+    return example, upload, caption, go, start, scales
