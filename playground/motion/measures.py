@@ -1,4 +1,4 @@
-"""Metrics of one motion, or of two, from joint positions alone (systems.md F2). numpy only, float64 inside."""
+"""Measures of one motion, or of two, from joint positions alone (systems.md F2). numpy only, float64 inside."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -72,7 +72,11 @@ def test_running_sums_equal_a_slow_loop():
     total, expected = torch.zeros(2, 6, 12), []
     for level in range(2):
         vectors = generator.quantizer.codebooks[level].vectors[tokens.ids[level]]
-        up = vectors if vectors.shape[1] == 6 else F.interpolate(vectors.transpose(1, 2), 6, mode="linear").transpose(1, 2)
+        up = (
+            vectors
+            if vectors.shape[1] == 6
+            else F.interpolate(vectors.transpose(1, 2), 6, mode="linear").transpose(1, 2)
+        )
         total = total + generator.quantizer.phis[level](up)
         expected.append(total)
     for ours, slow in zip(running_sums(generator.quantizer, tokens), expected, strict=True):
