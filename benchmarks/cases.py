@@ -162,7 +162,7 @@ def shipped() -> dict[str, Any]:
     longest = max(corpus(40, seed=0), key=lambda item: item.motion.frames).motion
     held = np.minimum(np.arange(FRAMES + 1), longest.frames - 1)  # the last pose is held where the motion is shorter
     motion = Motion(longest.joints[held])
-    caption = "a person walks forward and waves with the left hand"
+    caption = "a person steadily walks forward and waves with the left hand"
     start = time.perf_counter()
     engine.runtime(name)
     seconds = {"load": time.perf_counter() - start}

@@ -127,7 +127,7 @@ def test_decode_to_other_formats(tokens: Path) -> None:
 
 
 def test_generate_is_repeatable_and_as_long_as_asked(folder: Path) -> None:
-    words = ["generate", "a person walks forward", "--seconds", "2.5", "--system", SYSTEM, "--out"]
+    words = ["generate", "a person steadily walks forward", "--seconds", "2.5", "--system", SYSTEM, "--out"]
     run(*words, folder / "first.npz", "--seed", 3)
     call(*words, folder / "again.npz", "--seed", 3)
     call(*words, folder / "other.npz", "--seed", 4)
@@ -135,7 +135,7 @@ def test_generate_is_repeatable_and_as_long_as_asked(folder: Path) -> None:
     for name in ("first", "again", "other"):
         with np.load(folder / f"{name}.npz") as archive:
             joints.append(archive["joints"])
-            assert str(archive["caption"]) == "a person walks forward"
+            assert str(archive["caption"]) == "a person steadily walks forward"
     assert joints[0].shape == (48, 22, 3) and joints[0].dtype == np.float32  # floor(20 * 2.5 / 4) * 4
     np.testing.assert_allclose(joints[0], joints[1], atol=1e-4)
     assert np.abs(joints[0] - joints[2]).max() > 1e-2

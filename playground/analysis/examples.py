@@ -42,16 +42,16 @@ _STILL = {"style": "neutral"}
 _TRIP = {"style": "neutral", "starts": "standing", "ends": "standing"}
 
 SYNTHETIC = (
-    Recipe("synthetic-walk", "Easy walk", "a person walks forward at an easy pace", "walk",
+    Recipe("synthetic-walk", "Easy walk", "a person steadily walks forward at an easy pace", "walk",
            "walk", _TRIP | {"speed": 1.2}),
-    Recipe("synthetic-turn", "Walk, then a left turn", "a person walks forward and turns left", "walk and turn",
+    Recipe("synthetic-turn", "Walk, then a left turn", "a person steadily walks forward and turns left", "walk and turn",
            "turn_walk", _TRIP | {"gait": "walk", "turn_degrees": 90.0, "speed": 1.1}),
-    Recipe("synthetic-run", "Run", "a person runs forward", "run", "run", _TRIP | {"speed": 3.0}),
+    Recipe("synthetic-run", "Run", "a person is running forward", "run", "run", _TRIP | {"speed": 3.0}),
     Recipe("synthetic-sidestep", "Side-steps to the right", "a person steps sideways to the right", "step", "side_step",
            _STILL | {"side": "right"}),
-    Recipe("synthetic-wave", "Wave with the right hand", "a person waves with the right hand", "wave", "wave",
+    Recipe("synthetic-wave", "Wave with the right hand", "a person is waving with the right hand", "wave", "wave",
            _STILL | {"side": "right", "repetitions": 4}),
-    Recipe("synthetic-jump", "Jump forward", "a person jumps forward", "jump", "jump",
+    Recipe("synthetic-jump", "Jump forward", "a person jumps ahead", "jump", "jump",
            _STILL | {"travel": "forward", "repetitions": 2}),
     Recipe("synthetic-kick", "Left kick", "a person kicks with the left leg", "kick", "kick",
            _STILL | {"side": "left", "repetitions": 1}),
@@ -59,22 +59,30 @@ SYNTHETIC = (
 )  # fmt: skip
 
 GENERATED = (
-    Recipe("generated-walk-wave", "Walk and wave", "a person walks forward and waves", "walk", seconds=5.0),
-    Recipe("generated-run", "Run", "a person runs forward", "run", seconds=3.0),
-    Recipe("generated-turn-left", "Left turn", "a person walks forward and turns left", "walk and turn", seconds=5.0),
+    Recipe("generated-walk-wave", "Walk and wave", "a person steadily walks forward and waves", "walk", seconds=5.0),
+    Recipe("generated-run", "Run", "a person is running forward", "run", seconds=3.0),
+    Recipe(
+        "generated-turn-left",
+        "Left turn",
+        "a person steadily walks forward and turns left",
+        "walk and turn",
+        seconds=5.0,
+    ),
     Recipe("generated-right-hand", "Right hand up", "a person raises the right hand", "raise hands", seconds=3.0),
-    Recipe("generated-both-hands", "Wave with both hands", "a person waves with both hands", "wave", seconds=4.0),
-    Recipe("generated-backwards", "Walk backwards", "a person walks backwards", "walk", seconds=5.0),
+    Recipe("generated-both-hands", "Wave with both hands", "a person is waving with both hands", "wave", seconds=4.0),
+    Recipe("generated-backwards", "Walk backwards", "a person is walking backwards", "walk", seconds=5.0),
     Recipe("generated-old", "An old walk", "an old person walks slowly", "walk", seconds=6.0),
     Recipe("generated-dance", "Dance", "a person dances", "dance", seconds=6.0),
 )
 
 DECODED = (
-    Recipe("clip-walk", "Walk", "a person walks forward", "walk"),
-    Recipe("clip-turn-right", "Walk, then a right turn", "a person walks forward and turns right", "walk and turn"),
-    Recipe("clip-run", "Run", "a person runs forward", "run"),
+    Recipe("clip-walk", "Walk", "a person steadily walks forward", "walk"),
+    Recipe(
+        "clip-turn-right", "Walk, then a right turn", "a person steadily walks forward and turns right", "walk and turn"
+    ),
+    Recipe("clip-run", "Run", "a person is running forward", "run"),
     Recipe("clip-left-hand", "Left hand up", "a person raises the left hand", "raise hands"),
-    Recipe("clip-wave", "Wave with both hands", "a person waves with both hands", "wave"),
+    Recipe("clip-wave", "Wave with both hands", "a person is waving with both hands", "wave"),
     Recipe("clip-squat", "Down and up", "a person bends down and comes up again", "squat or bow"),
     Recipe("clip-sword", "Sword and shield", "a person fights with a sword and a shield", "fight"),
     Recipe("clip-dance", "Dance", "a person dances", "dance"),

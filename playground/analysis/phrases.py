@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from playground.data.actions import GROUPS, action_of
 
 _SENTENCES: dict[tuple[str, str], str] = {
-    ("walk", ""): "a person walks forward",
+    ("walk", ""): "a person steadily walks forward",
     ("walk", "left"): "a person walks to the left",
     ("walk", "right"): "a person walks to the right",
-    ("walk", "back"): "a person walks backwards",
+    ("walk", "back"): "a person is walking backwards",
     ("walk and turn", ""): "a person walks and turns",
-    ("walk and turn", "left"): "a person walks forward and turns left",
-    ("walk and turn", "right"): "a person walks forward and turns right",
-    ("run", ""): "a person runs forward",
+    ("walk and turn", "left"): "a person steadily walks forward and turns left",
+    ("walk and turn", "right"): "a person steadily walks forward and turns right",
+    ("run", ""): "a person is running forward",
     ("run", "left"): "a person runs in a curve to the left",
     ("run", "right"): "a person runs in a curve to the right",
     ("turn", ""): "a person turns around on the spot",
@@ -27,9 +27,9 @@ _SENTENCES: dict[tuple[str, str], str] = {
     ("raise hands", "right"): "a person raises the right hand",
     ("raise hands", "both"): "a person raises both hands",
     ("wave", ""): "a person waves",
-    ("wave", "left"): "a person waves with the left hand",
-    ("wave", "right"): "a person waves with the right hand",
-    ("wave", "both"): "a person waves with both hands",
+    ("wave", "left"): "a person is waving with the left hand",
+    ("wave", "right"): "a person is waving with the right hand",
+    ("wave", "both"): "a person is waving with both hands",
     ("kick", ""): "a person kicks",
     ("kick", "left"): "a person kicks with the left foot",
     ("kick", "right"): "a person kicks with the right foot",
@@ -44,7 +44,7 @@ _SENTENCES: dict[tuple[str, str], str] = {
     ("floor", ""): "a person gets down to the floor",
     ("reach", ""): "a person reaches for something",
     ("gesture", ""): "a person makes a gesture with the arms",
-    ("stand", ""): "a person stands still",
+    ("stand", ""): "a person is standing still",
     ("other", ""): "a person moves",
 }
 _KNOWN = {name for name, _ in GROUPS}

@@ -36,13 +36,13 @@ class Prompt:
 
 
 PROMPTS: tuple[Prompt, ...] = (
-    Prompt("a person walks forward for a while", 5.0, judges.walk_forward),
-    Prompt("a person walks forward and turns left", 6.0, judges.turn_left),
-    Prompt("a person walks forward and turns right", 6.0, judges.turn_right),
+    Prompt("a person steadily walks forward for a while", 5.0, judges.walk_forward),
+    Prompt("a person steadily walks forward and turns left", 6.0, judges.turn_left),
+    Prompt("a person steadily walks forward and turns right", 6.0, judges.turn_right),
     Prompt("a person raises the left hand", 3.0, judges.raise_left_hand),
     Prompt("a person raises the right hand", 3.0, judges.raise_right_hand),
     Prompt("a person is running forward", 3.0, judges.run),
-    Prompt("a person walks backwards", 5.0, judges.walk_backwards),
+    Prompt("a person is walking backwards", 5.0, judges.walk_backwards),
     Prompt("a person is waving with both hands", 3.0, judges.wave_both_hands),
     Prompt("a person is waving with the left hand", 3.0, judges.wave_left_hand, plain=False),
     Prompt("a person is waving with the right hand", 3.0, judges.wave_right_hand, plain=False),

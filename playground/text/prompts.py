@@ -33,7 +33,9 @@ def normalise(text: str, *, what: str = "prompt", allow_empty: bool = False) -> 
             f"the {what} has {len(line)} characters, at most {LIMITS.max_prompt_chars} are accepted; shorten it"
         )
     if not line and not allow_empty:
-        raise PlaygroundError(f'the {what} is empty; write what the person does, for example "a person walks forward"')
+        raise PlaygroundError(
+            f'the {what} is empty; write what the person does, for example "a person steadily walks forward"'
+        )
     return line
 
 

@@ -57,7 +57,7 @@ def test_a_click_decodes_the_clip(place: tuple[Engine, Library], bundle: Bundle)
     row = bundle.position("clip3")
     decoded = place[0].decode(bundle.token_file(row))
     assert decoded.motion.frames == bundle.clips[row].frames == 196
-    assert bundle.clips[row].caption == "a person runs forward"
+    assert bundle.clips[row].caption == "a person is running forward"
 
 
 def test_nothing_of_the_data_set_is_kept_but_ids_and_tokens(bundle: Bundle, tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from playground.text.encoders import load_encoder
 from playground.text.minilm import MiniLMEncoder, model_folder
 
 SENTENCES = [
-    "a person walks forward",
-    "someone waves with both hands, then sits down on a low chair and gets up again",
+    "a person steadily walks forward",
+    "someone is waving with both hands, then sits down on a low chair and gets up again",
     "run",
     "Turning LEFT while jogging; the right arm stays raised!",
     "",

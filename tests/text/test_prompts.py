@@ -69,7 +69,7 @@ def test_mirror_against_a_slow_word_by_word_swap(words: list[str]) -> None:
 @pytest.mark.parametrize(
     ("typed", "clean"),
     [
-        ("  a person\t walks \r\n forward ", "a person walks forward"),
+        ("  a person\t steadily \r\n walks  forward ", "a person steadily walks forward"),
         ("wa\x00lk\x1b", "walk"),
         ("\u202ewalk\u202c \u200b left", "walk left"),
         ("cafe\u0301", "caf\u00e9"),

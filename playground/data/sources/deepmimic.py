@@ -44,7 +44,7 @@ CAPTIONS = {
     "humanoid3d_spin": "a person whirls around on one foot",
     "humanoid3d_spinkick": "a person turns around and kicks high",
     "humanoid3d_walk": "a person walks at an easy pace",
-    "0walk_forward": "a person walks straight ahead",
+    "0walk_forward": "a person steadily walks straight ahead",
     "turn_left0": "a person walks and bears left",
     "turn_left1": "a person walks in a curve to the left",
     "turn_right0": "a person walks and bears right",

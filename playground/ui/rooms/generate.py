@@ -22,10 +22,10 @@ from playground.ui.view import View
 NAME = "generate"
 LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens with every one of them."
 PROMPTS = (
-    "a person walks forward",
+    "a person steadily walks forward",
     "someone jogs",
     "a person turns left while walking",
-    "a person waves with both hands",
+    "a person is waving with both hands",
 )
 OPENING_SECONDS = 5.0
 DOING = "Choosing the first tokens"
