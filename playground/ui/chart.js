@@ -9,15 +9,18 @@
   if (window.mtpChart) return;
   let library = null;
 
+  // The figures come first: a large script is only fetched once the page has nothing more urgent to do.
+  const idle = () => new Promise((done) => (window.requestIdleCallback ?? setTimeout)(done, { timeout: 1500 }));
+
   function plotly(url) {
     if (window.Plotly) return Promise.resolve(window.Plotly);
-    library ??= new Promise((resolve, reject) => {
+    library ??= idle().then(() => new Promise((resolve, reject) => {
       const script = document.createElement('script');
       script.src = new URL(url, document.baseURI).href;
       script.onload = () => resolve(window.Plotly);
       script.onerror = () => { library = null; reject(new Error('the chart library did not load')); };
       document.head.appendChild(script);
-    });
+    }));
     return library;
   }
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.browser.server import CHROMIUM_FLAGS, chromium, serving
 
-expect.set_options(timeout=20_000)
+expect.set_options(timeout=60_000)  # a busy machine is slow, not wrong
 DESKTOP = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
 
@@ -66,6 +66,7 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
         made.page.on("request", lambda request: made.requests.append(request.url))
         made.page.on("console", lambda line: made.complaints.append(line.text) if line.type == "error" else None)
         made.page.on("pageerror", lambda error: made.complaints.append(str(error)))
+        made.page.set_default_timeout(60_000)
         made.page.goto(address)
         expect(made.page.get_by_role("tab", name="Tokenize", exact=True)).to_be_visible()
         return made

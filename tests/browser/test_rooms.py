@@ -9,9 +9,11 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.conftest import Visit
+from tests.conftest import drifting
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
+TOKEN_IDS = "() => Array.from(MotionStage.get('tokenize').data.tracks[0].levels[0].ids)"
 WATCH_LABELS = """() => {
   window.toldLabels = [];
   const labels = document.querySelector('#generate-stage .ms-labels');
@@ -101,6 +103,11 @@ def test_a_bvh_file_can_be_uploaded(seen: Visit, tmp_path: Path) -> None:
     page.locator("#tokenize-upload").locator("xpath=..").locator("input[type=file]").set_input_files(path)
     expect(page.locator("#tokenize-message")).to_contain_text("mine.bvh")
     expect(page.locator("#tokenize-stage .ms-labels")).not_to_have_text(was)
+    own = facts(page, "tokenize").inner_text()
+    choose(page, "tokenize-example", 2)
+    expect(facts(page, "tokenize")).not_to_have_text(own)
+    assert choose(page, "tokenize-example", 0).endswith("mine.bvh · yours")  # it stays in the menu
+    expect(facts(page, "tokenize")).to_have_text(own, use_inner_text=True)
 
 
 @pytest.mark.parametrize("name", ["binary.bvh", "pickled.npy", "bomb.npz", "short.npz", "empty.bvh", "notes.txt"])
@@ -210,16 +217,34 @@ def test_a_click_on_the_map_puts_that_motion_on_the_stage(seen: Visit) -> None:
     expect(page.locator("#embedding-facts")).to_contain_text("40 mm")
 
 
-def test_a_neighbour_can_be_chosen_by_keyboard(seen: Visit) -> None:
+def test_neighbours_can_be_walked_by_keyboard(seen: Visit) -> None:
     page = seen.enter("Embedding map")
     choices = page.locator("#embedding-near input[type=radio]")
-    expect(choices).to_have_count(4)
-    sent = len(seen.requests)
-    choices.first.focus()
-    choices.first.press("Space")
-    expect(page.locator("#embedding-near input[type=radio]:checked")).to_have_count(0)
-    assert seen.sent_since(sent)
+    for _ in range(2):
+        expect(choices).to_have_count(4)
+        offered = choices.first.get_attribute("value")
+        choices.first.focus()
+        choices.first.press("Space")
+        expect(page.locator("#embedding-near input[type=radio]:checked")).to_have_count(0)
+        expect(page.locator(f"#embedding-near input[value='{offered}']")).to_have_count(0)
     expect(page.locator("#embedding-message [role=alert]")).to_have_count(0)
+    expect(page.locator(".toast-body")).to_have_count(0)
+
+
+def test_a_long_upload_shows_its_window(seen: Visit, tmp_path: Path) -> None:
+    path = tmp_path / "long.npz"
+    np.savez(path, joints=drifting(500), fps=20.0)
+    page = seen.page
+    window = page.locator("#tokenize-start input[type=range]")
+    expect(window).to_have_count(0)
+    page.locator("#tokenize-upload").locator("xpath=..").locator("input[type=file]").set_input_files(path)
+    expect(window).to_be_visible()
+    assert float(window.get_attribute("max") or 0) == pytest.approx((500 - 197) / 20, abs=0.06)
+    expect(page.locator("#tokenize-stage .ms-time")).to_contain_text("9.80 s")
+    before = page.locator("#tokenize-score").evaluate(TOKEN_IDS)
+    window.focus()
+    window.press("End")
+    page.wait_for_function(f"(old) => JSON.stringify(({TOKEN_IDS})()) !== JSON.stringify(old)", arg=before)
 
 
 def test_codebooks_show_use_perplexity_and_dead_codes(seen: Visit) -> None:

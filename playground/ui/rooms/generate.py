@@ -114,9 +114,8 @@ class Handlers:
     def generate(self, *values: Any) -> Iterator[tuple[Any, ...]]:
         """Stage, facts and progress after every scale."""
         for view in stream(self.services, Wish.checked(*values)):
-            level, count = view.controls["level"], view.controls["count"]
-            note = f"Choosing tokens: scale {level} of {count} is done." if level < count else ""
-            yield Noted(view.stage_json(), note), view.facts_html(), Progress(level, count)
+            progress = Progress(view.controls["level"], view.controls["count"])
+            yield view.stage_json(), view.facts_html(), progress
 
     def stopped(self, made: Progress | None) -> tuple[Any, ...]:
         """What is said after "Stop"; the stage keeps what it has."""
@@ -179,13 +178,11 @@ def _switch(running: bool) -> Any:
 
 def _knobs() -> list[Any]:
     """The folded sampling controls in the order of `Wish.checked`; the first one is free-form."""
-    with gr.Accordion("Sampling", open=False, elem_classes=["mtp-knobs"]):
-        free = gr.Checkbox(False, label="Without any prompt (free-form)", elem_id="generate-free")
-        guidance = gr.Slider(0, LIMITS.max_guidance, 2.0, step=0.1, label="Guidance of the decoder, g")
-        cfg = gr.Slider(0, LIMITS.max_guidance, 4.0, step=0.1, label="Guidance of the generator, s (at the last scale)")
-        temperature = gr.Slider(
-            0, LIMITS.max_temperature, 1.0, step=0.05, label="Temperature (0 takes the likeliest code)"
-        )
-        top_k = gr.Slider(0.01, 1, 0.2, step=0.01, label="Top-k, share of the codes that may be chosen")
-        top_p = gr.Slider(0.05, 1, 0.95, step=0.01, label="Top-p, probability mass that may be chosen from")
+    with gr.Accordion("Sampling", open=False, elem_classes=["mtp-knobs"]), gr.Row(elem_classes=["mtp-pairs"]):
+        guidance = gr.Slider(0, LIMITS.max_guidance, 2.0, step=0.1, label="Guidance g, decoder")
+        cfg = gr.Slider(0, LIMITS.max_guidance, 4.0, step=0.1, label="Guidance s, generator")
+        temperature = gr.Slider(0, LIMITS.max_temperature, 1.0, step=0.05, label="Temperature")
+        top_k = gr.Slider(0.01, 1, 0.2, step=0.01, label="Top-k, share of codes")
+        top_p = gr.Slider(0.05, 1, 0.95, step=0.01, label="Top-p, share of odds")
+        free = gr.Checkbox(False, label="No prompt (free-form)", elem_id="generate-free")
     return [free, guidance, cfg, temperature, top_k, top_p]

@@ -29,7 +29,7 @@ LEAD = (
 CHART_HEIGHT = 104
 ENERGY = "% of energy missing after each scale; click a bar to stop there"
 UPLOADED = "uploaded"  # the menu's entry for the visitor's own file
-DOING = "Tokenizing"
+DOING, AGAIN = "Tokenizing", "Rebuilding"
 MARK_SCALES = """(n) => {
   const stage = window.MotionStage?.get('tokenize');
   stage?.setScale(n < (stage.data?.tracks[0]?.levels.length ?? 0) ? n : null, 'upto');
@@ -180,10 +180,23 @@ def room(services: Services) -> None:
     attach(upload.upload, do.bring, [upload], everything, message, stage=NAME, doing=DOING)
     for event in (caption.submit, go.click):
         attach(event, do.again, [caption, session], everything, message, stage=NAME, doing=DOING)
-    attach(start.input, do.move, [start, session], everything, message, trigger_mode="always_last")
+    attach(
+        start.input, do.move, [start, session], everything, message, stage=NAME, doing=DOING, trigger_mode="always_last"
+    )
     scales.change(None, [scales], None, js=MARK_SCALES, api_visibility="private")
-    attach(scales.input, do.rebuild, [scales, session], parts, message, trigger_mode="always_last")
-    attach(energy.pick, do.stop_at, [session], [*parts, scales], message, trigger_mode="always_last")
+    attach(
+        scales.input, do.rebuild, [scales, session], parts, message, stage=NAME, doing=AGAIN, trigger_mode="always_last"
+    )
+    attach(
+        energy.pick,
+        do.stop_at,
+        [session],
+        [*parts, scales],
+        message,
+        stage=NAME,
+        doing=AGAIN,
+        trigger_mode="always_last",
+    )
 
 
 def _controls(services: Services, opening: View) -> tuple[Any, ...]:

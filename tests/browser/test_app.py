@@ -1,0 +1,94 @@
+"""The app that visitors get: `python -m playground app` with what is shipped in assets/. Skipped while nothing is."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlparse
+
+import pytest
+from playwright.sync_api import expect
+
+from playground.systems import checkpoint_path
+from tests.browser.conftest import Visit
+from tests.browser.server import ROOT, serving
+
+pytestmark = pytest.mark.browser
+Go = Callable[..., Visit]
+ASSETS = ROOT / "assets"
+ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance")
+
+
+def shipped(*parts: Path) -> None:
+    """Skip where one of these is not there."""
+    missing = [part.relative_to(ROOT).as_posix() for part in parts if not part.exists()]
+    if missing:
+        pytest.skip(f"not shipped with this copy: {', '.join(missing)}")
+
+
+@pytest.fixture(scope="module")
+def app() -> Iterator[str]:
+    files = [checkpoint_path(ASSETS, "lgtok-lite", part) for part in ("tokenizer", "generator")]
+    shipped(*files, ASSETS / "examples" / "index.json", ASSETS / "analysis" / "lgtok-lite.json")
+    with serving("-m", "playground", "app", "--host", "127.0.0.1", "--port", "{port}") as address:
+        yield address
+
+
+def test_the_first_page_comes_from_stored_results_and_needs_no_torch() -> None:
+    shipped(*(ASSETS / "opening" / f"{room}.json" for room in ROOMS))
+    code = "import sys; from playground.ui.app import build; build(); print(*(n in sys.modules for n in HEAVY))"
+    code = code.replace("HEAVY", "('torch', 'sklearn')")
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-2:] == ["False", "False"], done.stderr
+
+
+def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> None:
+    seen = visit(app)
+    page = seen.page
+    facts = page.locator("#tokenize-facts")
+    expect(facts).to_contain_text("MPJPE")
+    shown = re.search(r"([\d.]+)\s*mm", facts.inner_text())
+    assert shown is not None and float(shown.group(1)) < 40  # the opening example comes back well
+
+    page.locator("#tokenize-go").click()
+    expect(page.locator("#tokenize-stage .ms-badge")).to_contain_text("live")
+
+    seen.enter("Embedding map")
+    expect(page.locator("#embedding-map .scatterlayer .trace .point").first).to_be_visible()
+    choice = page.locator("#embedding-near input[type=radio]").first
+    choice.check(force=True)
+    expect(page.locator("#embedding-stage .ms-badge")).to_contain_text("live")
+
+    seen.enter("Codebooks")
+    expect(page.locator("#codebooks-table tbody tr")).to_have_count(10)
+
+    seen.enter("Generate")
+    page.locator("#generate-prompt textarea").fill("a person walks in a circle")
+    page.locator("#generate-seed input").fill("3")
+    page.locator("#generate-go").click()
+    expect(page.locator("#generate-stage .ms-badge")).to_contain_text("live")
+    expect(page.locator("#generate-go")).to_be_enabled()
+    expect(page.locator("#generate-message [role=alert]")).to_have_count(0)
+
+    seen.enter("Guidance")
+    page.locator("#guidance-caption").locator("input, textarea").fill("a person sneaks")
+    page.locator("#guidance-go").click()
+    expect(page.locator("#guidance-stage .ms-badge")).to_contain_text("live")
+
+    hosts = {urlparse(url).hostname for url in seen.requests if not url.startswith(("data:", "blob:"))}
+    assert hosts == {"127.0.0.1"} and seen.complaints == []
+
+
+def test_the_same_seed_shows_the_same_tokens(visit: Go, app: str) -> None:
+    ids = "() => MotionStage.get('generate').data.tracks[0].levels.map((level) => Array.from(level.ids ?? []))"
+    found = []
+    for _ in range(2):
+        page = visit(app).enter("Generate")
+        expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Generated")
+        page.locator("#generate-seed input").fill("11")
+        page.locator("#generate-go").click()
+        expect(page.locator("#generate-go")).to_be_disabled()
+        expect(page.locator("#generate-go")).to_be_enabled(timeout=60_000)
+        found.append(page.evaluate(ids))
+    assert found[0] == found[1] and len(found[0]) == 10 and all(found[0])
