@@ -152,7 +152,7 @@ def _for_models(command: Command) -> None:
     sub.add_argument("--seconds", type=_number, default=5.0)
     sub.add_argument("--seed", type=int, default=0)
     sub.add_argument("--system", default=DEFAULT_SYSTEM)
-    sub.add_argument("--guidance", type=_number, default=2.0, help="guidance scale g of the decoder (default 2)")
+    sub.add_argument("--guidance", type=_number, help="guidance scale g of the decoder (default: the system's own)")
     sub.add_argument("--out", type=_output(*MOTION_FILES), required=True, metavar="FILE", help=".npz, .bvh or .glb")
     sub.add_argument("--json", dest="to", type=_output(), metavar="TOKENS.json", help="also write the tokens")
 

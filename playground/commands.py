@@ -95,7 +95,7 @@ def generate(
     seconds: float,
     seed: int,
     system: str,
-    guidance: float,
+    guidance: float | None,
     out: Path,
     to: Path | None,
 ) -> None:

@@ -11,7 +11,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -147,25 +147,30 @@ class Engine:
         seconds: float,
         system: str = "lgtok-lite",
         seed: int = 0,
-        guidance: float = 2.0,
-        cfg: float = 4.0,
-        temperature: float = 1.0,
-        top_k: float = 0.2,
-        top_p: float = 0.95,
+        guidance: float | None = None,
+        cfg: float | None = None,
+        temperature: float | None = None,
+        top_k: float | None = None,
+        top_p: float | None = None,
         deadline: float | None = LIMITS.deadline_seconds,
         previews: bool = True,
     ) -> Iterator[GenerationStep]:
         """Yield the motion after every scale; without previews after the last one alone.
 
-        prompt None is free-form. cfg guides the generator, guidance the decoder.
+        prompt None is free-form. cfg guides the generator, guidance the decoder; what is None is the system's own
+        default (systems.SamplingDefaults).
 
         PlaygroundError for an empty prompt, a number out of range, or a run past the deadline (checked at every scale).
         """
         text = None if prompt is None else normalise(prompt)
-        frames = check_generation(seconds, seed, guidance, cfg, temperature, top_k, top_p)
+        asked = {"guidance": guidance, "cfg": cfg, "temperature": temperature, "top_k": top_k, "top_p": top_p}
+        given = {key: value for key, value in asked.items() if value is not None}
+        chosen = replace(row_of(system).sampling, **given)
+        frames = check_generation(seconds, seed, **asdict(chosen))
         runtime = self.runtime(system)
         check = _deadline(deadline)
-        sampling = {"seed": seed, "cfg": cfg, "temperature": temperature, "top_k": top_k, "top_p": top_p}
+        sampling = {"seed": seed, **asdict(chosen)}
+        guidance = sampling.pop("guidance")
         entropy: list[NDArray[np.float32]] = []
         for step in runtime.generate(text, frames, {**sampling, "check": check}):
             entropy.append(step.entropy)

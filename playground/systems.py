@@ -17,6 +17,17 @@ MAX_HEADER = 8 * 1024 * 1024  # bytes of a checkpoint's header
 
 
 @dataclass(frozen=True)
+class SamplingDefaults:
+    """What a generation uses where nothing else is asked for; the defaults are LG-Tok's on HumanML3D (A8, A10)."""
+
+    guidance: float = 2.0  # g of the detokenizer
+    cfg: float = 4.0  # s of the generator, reached at the last scale
+    temperature: float = 1.0
+    top_k: float = 0.2  # share of the codes kept
+    top_p: float = 0.95  # nucleus on what is left
+
+
+@dataclass(frozen=True)
 class SystemRow:
     """One system. Files stand in `assets/checkpoints/<name>/`, unless another system lends its tokenizer."""
 
@@ -27,6 +38,7 @@ class SystemRow:
     generator: str | None
     text: str = "minilm"  # text encoder of both
     latents_are_frames: bool = False  # does a latent stand for a fixed span of frames by construction?
+    sampling: SamplingDefaults = SamplingDefaults()
 
 
 SYSTEMS: dict[str, SystemRow] = {
@@ -49,6 +61,7 @@ class SystemInfo:
     data: str  # library it was trained on, "" if absent
     checkpoint: str  # shipped | absent
     facts: dict[str, Any]  # of the tokenizer: steps, seconds, seed, last validation
+    sampling: SamplingDefaults = SamplingDefaults()
 
 
 def checkpoint_path(assets: Path, name: str, part: str) -> Path:
@@ -103,4 +116,5 @@ def describe(assets: Path, row: SystemRow) -> SystemInfo:
         data=metadata["data"] if metadata else "",
         checkpoint="shipped" if metadata else "absent",
         facts=json.loads(metadata["facts"]) if metadata else {},
+        sampling=row.sampling,
     )

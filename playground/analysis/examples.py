@@ -44,7 +44,7 @@ _TRIP = {"style": "neutral", "starts": "standing", "ends": "standing"}
 SYNTHETIC = (
     Recipe("synthetic-walk", "Easy walk", "a person steadily walks forward at an easy pace", "walk",
            "walk", _TRIP | {"speed": 1.2}),
-    Recipe("synthetic-turn", "Walk, then a left turn", "a person steadily walks forward and turns left", "walk and turn",
+    Recipe("synthetic-turn", "Walk and a left turn", "a person steadily walks forward and turns left", "walk and turn",
            "turn_walk", _TRIP | {"gait": "walk", "turn_degrees": 90.0, "speed": 1.1}),
     Recipe("synthetic-run", "Run", "a person is running forward", "run", "run", _TRIP | {"speed": 3.0}),
     Recipe("synthetic-sidestep", "Side-steps to the right", "a person steps sideways to the right", "step", "side_step",

@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import gradio as gr
 import numpy as np
 
 from playground.limits import LIMITS
+from playground.systems import SamplingDefaults
 from playground.text.prompts import normalise
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.facts import Fact, significant
@@ -101,7 +102,8 @@ def entropy_fact(entropy: Sequence[Any]) -> Fact:
 
 def opening_view(services: Services) -> View:
     """The room's first result: the first prompt, seed 0."""
-    *_, last = stream(services, Wish.checked(PROMPTS[0], False, OPENING_SECONDS, 0, 2.0, 4.0, 1.0, 0.2, 0.95))
+    numbers = astuple(services.default_system().sampling)
+    *_, last = stream(services, Wish.checked(PROMPTS[0], False, OPENING_SECONDS, 0, *numbers))
     return last
 
 
@@ -134,7 +136,7 @@ def room(services: Services) -> None:
             prompt, seconds, seed, go, cancel = _controls(opening)
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
-            free, *numbers = _knobs()
+            free, *numbers = _knobs(services.default_system().sampling)
         words(NAME)
     do = Handlers(services)
     inputs = [prompt, free, seconds, seed, *numbers]
@@ -176,13 +178,13 @@ def _switch(running: bool) -> Any:
     return lambda: (gr.update(interactive=not running), gr.update(interactive=running))
 
 
-def _knobs() -> list[Any]:
+def _knobs(default: SamplingDefaults) -> list[Any]:
     """The folded sampling controls in the order of `Wish.checked`; the first one is free-form."""
     with gr.Accordion("Sampling", open=False, elem_classes=["mtp-knobs"]), gr.Row(elem_classes=["mtp-pairs"]):
-        guidance = gr.Slider(0, LIMITS.max_guidance, 2.0, step=0.1, label="Guidance g, decoder")
-        cfg = gr.Slider(0, LIMITS.max_guidance, 4.0, step=0.1, label="Guidance s, generator")
-        temperature = gr.Slider(0, LIMITS.max_temperature, 1.0, step=0.05, label="Temperature")
-        top_k = gr.Slider(0.01, 1, 0.2, step=0.01, label="Top-k, share of codes")
-        top_p = gr.Slider(0.05, 1, 0.95, step=0.01, label="Top-p, share of odds")
+        guidance = gr.Slider(0, LIMITS.max_guidance, default.guidance, step=0.1, label="Guidance g, decoder")
+        cfg = gr.Slider(0, LIMITS.max_guidance, default.cfg, step=0.1, label="Guidance s, generator")
+        temperature = gr.Slider(0, LIMITS.max_temperature, default.temperature, step=0.05, label="Temperature")
+        top_k = gr.Slider(0.01, 1, default.top_k, step=0.01, label="Top-k, share of codes")
+        top_p = gr.Slider(0.05, 1, default.top_p, step=0.01, label="Top-p, share of odds")
         free = gr.Checkbox(False, label="No prompt (free-form)", elem_id="generate-free")
     return [free, guidance, cfg, temperature, top_k, top_p]
