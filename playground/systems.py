@@ -43,7 +43,16 @@ class SystemRow:
 
 SYSTEMS: dict[str, SystemRow] = {
     row.name: row
-    for row in (SystemRow("lgtok-lite", "LG-Tok lite", "lgtok", "LG-Tok transformer", "scale-wise autoregression"),)
+    for row in (
+        SystemRow(
+            "lgtok-lite",
+            "LG-Tok lite",
+            "lgtok",
+            "LG-Tok transformer",
+            "scale-wise autoregression",
+            sampling=SamplingDefaults(guidance=0.0, cfg=3.0),  # chosen by the plain prompts that it obeys
+        ),
+    )
 }
 
 
