@@ -103,7 +103,6 @@ def attach(
     doing: str = "Working",
     model: bool = True,
     trigger_mode: Literal["once", "multiple", "always_last"] = "once",
-    cancels: Any = None,
 ) -> Any:
     """Bind `handler` to a Gradio event such as `button.click`, guarded. Returns the dependency.
 
@@ -119,7 +118,6 @@ def attach(
         api_visibility="private",
         show_progress="hidden",
         trigger_mode=trigger_mode,
-        cancels=cancels,
         js=stage_call(stage, "busy", doing) if stage else None,
     )
     if stage:

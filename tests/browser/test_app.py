@@ -64,6 +64,7 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
     expect(page.locator("#codebooks-table tbody tr")).to_have_count(10)
 
     seen.enter("Generate")
+    seen.settle()
     page.locator("#generate-prompt textarea").fill("a person walks in a circle")
     page.locator("#generate-seed input").fill("3")
     page.locator("#generate-go").click()
@@ -72,6 +73,7 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
     expect(page.locator("#generate-message [role=alert]")).to_have_count(0)
 
     seen.enter("Guidance")
+    seen.settle()
     page.locator("#guidance-caption").locator("input, textarea").fill("a person sneaks")
     page.locator("#guidance-go").click()
     expect(page.locator("#guidance-stage .ms-badge")).to_contain_text("live")
@@ -84,7 +86,9 @@ def test_the_same_seed_shows_the_same_tokens(visit: Go, app: str) -> None:
     ids = "() => MotionStage.get('generate').data.tracks[0].levels.map((level) => Array.from(level.ids ?? []))"
     found = []
     for _ in range(2):
-        page = visit(app).enter("Generate")
+        seen = visit(app)
+        page = seen.enter("Generate")
+        seen.settle()
         expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Generated")
         page.locator("#generate-seed input").fill("11")
         page.locator("#generate-go").click()

@@ -148,6 +148,7 @@ def test_a_bad_prompt_gives_one_sentence_and_the_last_result_stays(seen: Visit, 
     page = seen.enter("Generate")
     expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Generated")
     before = facts(page, "generate").inner_text()
+    seen.settle()
     page.locator("#generate-prompt textarea").fill(prompt)
     page.locator("#generate-go").click()
     expect(error_in(page, "generate")).to_have_text(re.compile(r"^The prompt [^.]*\.?[^.]*$"))
@@ -158,6 +159,7 @@ def test_a_bad_prompt_gives_one_sentence_and_the_last_result_stays(seen: Visit, 
 def test_a_motion_appears_scale_by_scale(seen: Visit) -> None:
     page = seen.enter("Generate")
     expect(page.locator("#generate-score .ms-heads")).to_contain_text("116 tokens in 10 scales")
+    seen.settle()
     page.evaluate(WATCH_LABELS)
     page.locator("#generate-prompt textarea").fill("a person sits down")
     page.locator("#generate-go").click()

@@ -16,7 +16,6 @@ from playground.ui.facts import Fact, significant
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.scenes import generated_scene, token_facts
 from playground.ui.services import Services
-from playground.ui.stage.component import stage_call
 from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
@@ -67,11 +66,10 @@ class Wish:
 
 
 @dataclass
-class Progress:
-    """How far one visitor's generation has come."""
+class Control:
+    """The one object that a visitor's running generation and the "Stop" button share."""
 
-    level: int = 0
-    count: int = 0
+    stop: bool = False
 
 
 def stream(services: Services, wish: Wish) -> Iterator[View]:
@@ -108,28 +106,44 @@ def opening_view(services: Services) -> View:
 
 
 class Handlers:
-    """What the controls do."""
+    """What the controls do. A generation looks at its control after every scale, so that stopping waits for nobody."""
 
     def __init__(self, services: Services) -> None:
         self.services = services
 
-    def generate(self, *values: Any) -> Iterator[tuple[Any, ...]]:
-        """Stage, facts and progress after every scale."""
-        for view in stream(self.services, Wish.checked(*values)):
-            progress = Progress(view.controls["level"], view.controls["count"])
-            yield view.stage_json(), view.facts_html(), progress
+    def begin(self, control: Control) -> tuple[Any, ...]:
+        """At the click, before any waiting: "Stop" becomes possible and "Generate" does not."""
+        control.stop = False
+        return gr.update(interactive=False), gr.update(interactive=True)
 
-    def stopped(self, made: Progress | None) -> tuple[Any, ...]:
-        """What is said after "Stop"; the stage keeps what it has."""
-        done = made or Progress()
-        text = f"Stopped; this is the motion after scale {done.level} of {done.count}."
-        return (Noted(gr.skip(), text if 0 < done.level < done.count else "Stopped before the first scale was done."),)
+    def stop(self, control: Control) -> Any:
+        """Ask the running generation to end after the scale it is at."""
+        control.stop = True
+        return gr.update(interactive=False)
+
+    def end(self) -> tuple[Any, ...]:
+        """After the last word: "Generate" becomes possible again."""
+        return gr.update(interactive=True), gr.update(interactive=False)
+
+    def generate(self, control: Control, *values: Any) -> Iterator[tuple[Any, ...]]:
+        """Stage and facts after every scale."""
+        wish = Wish.checked(*values)
+        if control.stop:
+            yield Noted(gr.skip(), "Stopped before the first scale was done."), gr.skip()
+            return
+        for view in stream(self.services, wish):
+            level, count = view.controls["level"], view.controls["count"]
+            halted = control.stop and level < count
+            note = f"Stopped; this is the motion after scale {level} of {count}." if halted else ""
+            yield Noted(view.stage_json(), note), view.facts_html()
+            if halted:
+                return
 
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    progress = gr.State(Progress(), time_to_live=LIMITS.session_seconds)
+    control = gr.State(Control(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
         with panel("Words become a motion", LEAD):
@@ -139,16 +153,14 @@ def room(services: Services) -> None:
             free, *numbers = _knobs(services.default_system().sampling)
         words(NAME)
     do = Handlers(services)
-    inputs = [prompt, free, seconds, seed, *numbers]
-    runs = []
+    inputs = [control, prompt, free, seconds, seed, *numbers]
+    buttons = [go, cancel]
+    quick: dict[str, Any] = {"queue": False, "api_visibility": "private", "show_progress": "hidden"}
     for event in (go.click, prompt.submit):
-        busy = event(_switch(True), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
-        run = attach(busy.then, do.generate, inputs, [stage, facts, progress], message, stage=NAME, doing=DOING)
-        run.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
-        runs.append(run)
-    halt = attach(cancel.click, do.stopped, [progress], [stage], message, cancels=runs, model=False)
-    halt.then(None, None, None, js=stage_call(NAME, "say", "ready"), api_visibility="private")
-    halt.then(_switch(False), None, [go, cancel], queue=False, api_visibility="private", show_progress="hidden")
+        started = event(do.begin, [control], buttons, **quick)
+        run = attach(started.then, do.generate, inputs, [stage, facts], message, stage=NAME, doing=DOING)
+        run.then(do.end, None, buttons, **quick)
+    cancel.click(do.stop, [control], [cancel], **quick)
 
 
 def _controls(opening: View) -> tuple[Any, ...]:
@@ -171,11 +183,6 @@ def _controls(opening: View) -> tuple[Any, ...]:
         go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
         cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
     return prompt, seconds, seed, go, cancel
-
-
-def _switch(running: bool) -> Any:
-    """A handler that enables "Generate" or "Stop", whichever makes sense now."""
-    return lambda: (gr.update(interactive=not running), gr.update(interactive=running))
 
 
 def _knobs(default: SamplingDefaults) -> list[Any]:
