@@ -1,7 +1,10 @@
 """What stands on the stage in each room: payloads of figures/stage.py made from what the engine returns."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from playground.figures import stage as scene
 from playground.figures.stage import NOT_FRAMES, ORIGINAL_ID, Json
@@ -29,11 +32,12 @@ def score(
     sizes: Sequence[tuple[int, int]] = (),
 ) -> Json:
     """The score of one motion: LevelTokens `levels` as rows. The scales of `sizes`, (tokens, codes) each, that have no
-    tokens yet are drawn empty. palettes: colours uint8 [codes, 3] a scale."""
+    tokens yet are drawn empty. palettes: colours uint8 [codes, 3] a scale; entropy: bits [s] a scale."""
     rows = []
     for n, level in enumerate(levels):
         colors = palettes[n] if palettes else None
-        rows.append(scene.level(level.ids, level.codes, colors, entropy[n] if entropy else None))
+        nats = np.asarray(entropy[n], np.float64) * math.log(2) if entropy else None  # the engine counts in bits
+        rows.append(scene.level(level.ids, level.codes, colors, nats))
     rows += [scene.level(None, codes, size=size) for size, codes in sizes[len(levels) :]]
     return scene.track(system.name, system.title, frames, rows, NOT_FRAMES)
 

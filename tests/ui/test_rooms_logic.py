@@ -1,5 +1,7 @@
 """What the rooms compute, on the engine's stand-in."""
 
+import base64
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,15 @@ def test_generation_gives_one_view_a_scale(services: Services) -> None:
     assert rows == list(range(1, len(SIZES) + 1))
     assert all(len(view.stage["tracks"][0]["levels"]) == len(SIZES) for view in views)
     assert views[-1].stage["figures"][0]["caption"] == ""
+
+
+def test_the_stage_hears_of_entropy_in_nats(services: Services) -> None:
+    wish = generate.Wish.checked("a person sits", False, 4.0, 3, 2.0, 4.0, 1.0, 0.2, 0.95)
+    *_, step = services.engine().generate_steps(wish.prompt, wish.seconds, seed=wish.seed)
+    *_, view = generate.stream(services, wish)
+    for level, bits in zip(view.stage["tracks"][0]["levels"], step.entropy, strict=True):
+        sent = np.frombuffer(base64.b64decode(level["entropy"]), "<f4")
+        assert np.allclose(np.exp(sent), 2.0**bits, rtol=1e-5)
 
 
 @pytest.mark.parametrize(
