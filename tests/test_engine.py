@@ -15,7 +15,7 @@ from playground.limits import LIMITS
 from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
 from playground.motion.representation import Normaliser, from_features67, to_features67
-from playground.systems import checkpoint_path, header
+from playground.systems import checkpoint_path, header, row_of
 from playground.text.encoders import identify, load_encoder
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 from tests.conftest import drifting
@@ -100,7 +100,7 @@ def test_generation_yields_every_scale_and_is_the_same_for_a_seed(engine):
     np.testing.assert_array_equal(whole.motion.joints, steps[-1].motion.joints)
     other = engine.generate(PROMPT, 3.0, seed=5)
     assert any(not np.array_equal(a.ids, b.ids) for a, b in zip(whole.levels, other.levels, strict=True))
-    again = engine.decode(whole.token_file(), guidance=2.0)
+    again = engine.decode(whole.token_file(), guidance=row_of("lgtok-lite").sampling.guidance)
     np.testing.assert_allclose(again.motion.joints, whole.motion.joints, atol=1e-5)
 
 
