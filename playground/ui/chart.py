@@ -11,8 +11,8 @@ import gradio as gr
 
 _TEMPLATE = """
 <figure class="mtp-figure"><figcaption ${titled ? "" : "hidden"}>${label}</figcaption>
-<div class="mtp-chart" role="img" aria-label="${label}" style="height:${height}px;min-width:${narrowest}px"></div>
-</figure>
+<div class="mtp-chart ${value ? 'is-coming' : ''}" role="img" aria-label="${label}"
+ style="height:${height}px;min-width:${narrowest}px"></div></figure>
 """
 _START = """
 const start = () => window.mtpChart ? window.mtpChart(element, props, trigger, watch) : requestAnimationFrame(start);

@@ -14,6 +14,7 @@ from typing import Any, Literal
 import gradio as gr
 
 from playground.errors import PlaygroundError
+from playground.ui.facts import as_sentence
 from playground.ui.stage.component import stage_call
 
 log = logging.getLogger(__name__)
@@ -23,12 +24,8 @@ OUR_FAULT = "Something went wrong on our side; your last result is still here, p
 
 
 def error_line(sentence: str) -> str:
-    """HTML of the message line for an error. The sentence is escaped, capitalised and closed with a full stop."""
-    text = " ".join(sentence.split()) or OUR_FAULT
-    text = text[0].upper() + text[1:]
-    if text[-1] not in ".!?":
-        text += "."
-    return f'<p class="mtp-message mtp-error" role="alert">{html.escape(text)}</p>'
+    """HTML of the message line for an error, escaped."""
+    return f'<p class="mtp-message mtp-error" role="alert">{html.escape(as_sentence(sentence) or OUR_FAULT)}</p>'
 
 
 def note_line(sentence: str) -> str:

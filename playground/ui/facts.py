@@ -73,6 +73,12 @@ def _cell(fact: Fact) -> str:
     return f'<div class="mtp-fact"><dd>{html.escape(fact.value)}</dd> <dt>{label}</dt></div>'
 
 
+def as_sentence(text: str) -> str:
+    """Words of an error as a sentence on the page: one line, a capital first letter, a full stop; "" stays ""."""
+    line = " ".join(text.split())
+    return line[:1].upper() + line[1:] + ("" if not line or line[-1] in ".!?" else ".")
+
+
 def table(header: list[str], rows: list[list[str]], caption: str) -> str:
     """A small HTML table; the first column is text, the others are numbers."""
     head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in header)

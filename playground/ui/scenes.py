@@ -9,6 +9,7 @@ import numpy as np
 from playground.figures import stage as scene
 from playground.figures.stage import NOT_FRAMES, ORIGINAL_ID, Json
 from playground.motion.motion import Motion
+from playground.systems import row_of
 from playground.ui.facts import Fact, bits, bits_text, millimetres
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def score(
         nats = np.asarray(entropy[n], np.float64) * math.log(2) if entropy else None  # the engine counts in bits
         rows.append(scene.level(level.ids, level.codes, colors, nats))
     rows += [scene.level(None, codes, size=size) for size, codes in sizes[len(levels) :]]
-    return scene.track(system.name, system.title, frames, rows, NOT_FRAMES)
+    note = "" if row_of(system.name).latents_are_frames else NOT_FRAMES
+    return scene.track(system.name, system.title, frames, rows, note)
 
 
 def tokenized_scene(

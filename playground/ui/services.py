@@ -13,7 +13,8 @@ from playground.analysis.bundle import Bundle, read_bundle
 from playground.errors import PlaygroundError
 from playground.figures.stage import code_colors, message
 from playground.motion.motion import Motion
-from playground.systems import checkpoint_path, header
+from playground.systems import SamplingDefaults, checkpoint_path, header
+from playground.ui.facts import as_sentence
 from playground.ui.view import View, read_view
 
 if TYPE_CHECKING:
@@ -91,13 +92,18 @@ class Services:
         try:
             return compute(self)
         except PlaygroundError as error:
-            return View(stage=message("empty", str(error)))
+            return View(stage=message("empty", as_sentence(str(error))))
 
     def bundle(self, system: str) -> Bundle:
         """The stored analysis of a system, read once; PlaygroundError if it is not there."""
         if system not in self._bundles:
             self._bundles[system] = read_bundle(self.engine().assets / "analysis", system)
         return self._bundles[system]
+
+    def sampling(self) -> SamplingDefaults:
+        """How the default system generates where nothing else is asked for."""
+        found = [system.sampling for system in self.engine().systems() if system.checkpoint == "shipped"]
+        return found[0] if found else SamplingDefaults()
 
     def default_system(self) -> "SystemInfo":
         """The first system with a shipped checkpoint; PlaygroundError if none is shipped."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.motion import Motion
+from playground.ui.facts import as_sentence
 
 SUFFIXES = (".bvh", ".npy", ".npz")
 WINDOW = LIMITS.max_frames + 1  # poses that a tokenizer sees at once: its rows are steps between poses
@@ -46,7 +47,7 @@ def read_upload(path: str | None) -> Source:
 
     read = read_motion(file)
     motion = replace(read.motion, name=_short(file.stem))
-    note = " ".join([_sentence(text) for text in (read.mapping, *read.changes) if text])
+    note = " ".join([as_sentence(text) for text in (read.mapping, *read.changes) if text])
     return Source(motion, title=_short(file.name), note=note)
 
 
@@ -59,11 +60,6 @@ def checked_number(value: object, name: str, low: float, high: float) -> float:
 
 def _short(name: str) -> str:
     return name if len(name) <= 40 else name[:37] + "..."
-
-
-def _sentence(text: str) -> str:
-    text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 def _listed(words: tuple[str, ...]) -> str:

@@ -60,10 +60,10 @@ def test_a_view_of_other_checkpoints_is_not_shown(services: Services) -> None:
 
 def test_a_room_without_anything_to_show_says_why(services: Services) -> None:
     def nothing(_: Services) -> View:
-        raise PlaygroundError("no trained system is shipped with this copy")
+        raise PlaygroundError("no trained system is shipped with\nthis copy")
 
     assert json.loads(services.first_view("none", nothing).stage_json()) == {
-        "version": 1, "state": "empty", "message": "no trained system is shipped with this copy",
+        "version": 1, "state": "empty", "message": "No trained system is shipped with this copy.",
     }  # fmt: skip
 
 

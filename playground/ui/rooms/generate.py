@@ -100,7 +100,7 @@ def entropy_fact(entropy: Sequence[Any]) -> Fact:
 
 def opening_view(services: Services) -> View:
     """The room's first result: the first prompt, seed 0."""
-    numbers = astuple(services.default_system().sampling)
+    numbers = astuple(services.sampling())
     *_, last = stream(services, Wish.checked(PROMPTS[0], False, OPENING_SECONDS, 0, *numbers))
     return last
 
@@ -150,7 +150,7 @@ def room(services: Services) -> None:
             prompt, seconds, seed, go, cancel = _controls(opening)
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
-            free, *numbers = _knobs(services.default_system().sampling)
+            free, *numbers = _knobs(services.sampling())
         words(NAME)
     do = Handlers(services)
     inputs = [control, prompt, free, seconds, seed, *numbers]
