@@ -21,6 +21,11 @@ class Source:
     note: str = ""  # what was read and changed, for an upload
 
     @property
+    def caption(self) -> str:
+        """The caption that came with the motion, cut to what is accepted."""
+        return self.motion.caption[: LIMITS.max_prompt_chars]
+
+    @property
     def is_long(self) -> bool:
         """Whether there is a window to choose."""
         return self.motion.frames > WINDOW

@@ -62,7 +62,8 @@ def test_no_file_is_said_so() -> None:
 
 def test_an_npz_of_joints_is_read_with_a_note(tmp_path: Path) -> None:
     path = tmp_path / "mine.npz"
-    np.savez(path, joints=drifting(60), fps=20.0)
+    np.savez(path, joints=drifting(60), fps=20.0, caption="somebody glides away")
     source = read_upload(str(path))
+    assert source.caption == "somebody glides away"
     assert source.motion.frames == 60 and source.title == "mine.npz"
     assert source.note.endswith(".")

@@ -112,14 +112,14 @@ class Handlers:
         """Another motion of the menu, with its own caption."""
         upload = held.upload if held else None
         if wanted == UPLOADED and upload is not None:
-            return self._show(Session(UPLOADED, upload, upload=upload))
+            return self._show(Session(UPLOADED, upload, caption=upload.caption, upload=upload))
         found = self.services.example(wanted)
         return self._show(Session(wanted, Source(found.motion(), found.title), 0.0, found.caption, upload=upload))
 
     def bring(self, path: str | None) -> tuple[Any, ...]:
-        """A file of the visitor's own, without a caption at first."""
+        """A file of the visitor's own, with the caption that it carries, if any."""
         source = read_upload(path)
-        session = Session(UPLOADED, source, upload=source)
+        session = Session(UPLOADED, source, caption=source.caption, upload=source)
         return self._show(session, note=f"{source.title}: {source.note}")
 
     def again(self, text: str, held: Session | None) -> tuple[Any, ...]:
