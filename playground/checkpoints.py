@@ -1,12 +1,13 @@
 """Self-describing checkpoints: one safetensors file holds half-precision weights, and its metadata says the rest.
 
-Metadata: format, kind (tokenizer | generator), config, encoder (name, width, hash of the text encoder), data, facts
-(steps, seconds, seed, validation figures). Loading needs no other file and runs no pickle.
+Metadata: format, kind (tokenizer | generator | evaluator), config, encoder (name, width, hash of the text encoder),
+data, facts (steps, seconds, seed, validation figures). Loading needs no other file and runs no pickle.
 """
 
 import hashlib
 import json
 import os
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,6 +26,7 @@ from playground.tokenizers.transformer import LGTok, TokenizerConfig, build_toke
 
 Model = TypeVar("Model", bound=nn.Module)
 FORMAT = "1"
+CONFIGS: Mapping[str, type] = {"tokenizer": TokenizerConfig, "generator": GeneratorConfig}  # kind -> its config
 TRAINING_ONLY = ("sums", "counts", "started")  # state of the EMA codebooks, not shipped
 
 
@@ -32,12 +34,12 @@ TRAINING_ONLY = ("sums", "counts", "started")  # state of the EMA codebooks, not
 class Card:
     """What a checkpoint says of itself."""
 
-    kind: str  # tokenizer | generator
-    config: Any  # TokenizerConfig | GeneratorConfig
+    kind: str  # tokenizer | generator | evaluator
+    config: Any  # TokenizerConfig | GeneratorConfig | EvaluatorConfig
     encoder: EncoderId
     data: str  # name of the library it saw
     facts: dict[str, Any]  # step, seconds, seed, last validation figures
-    normaliser: Normaliser | None = None  # of the tokenizer's features
+    normaliser: Normaliser | None = None  # of the features that a tokenizer or an evaluator reads
     hash: str = ""  # sha256 of the file, filled by loading
 
 
@@ -84,9 +86,22 @@ def load_generator(path: Path) -> tuple[ScalewiseTransformer, Card]:
     return _fill(build_generator(card.config), tensors, path), card
 
 
+def load_model(path: Path, kind: str, config: type, build: Callable[[Any], Model]) -> tuple[Model, Card]:
+    """A model of a kind from a floor above: the class of its config, and what builds it. Errors as above."""
+    card, tensors = _read(path, kind, weights=True, configs={kind: config})
+    try:
+        model = build(card.config)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise PlaygroundError(f"{path} asks for a model that this version cannot build") from error
+    return _fill(model, tensors, path), card
+
+
 def _fill(model: Model, tensors: dict[str, Tensor], path: Path) -> Model:
     weights = {name[6:]: value.float() for name, value in tensors.items() if name.startswith("model.")}
-    missing, unexpected = model.load_state_dict(weights, strict=False)
+    try:
+        missing, unexpected = model.load_state_dict(weights, strict=False)
+    except RuntimeError:  # other shapes
+        missing, unexpected = [], list(weights)
     if unexpected or any(name.rsplit(".", 1)[-1] not in TRAINING_ONLY for name in missing):
         raise PlaygroundError(f"the weights in {path} do not fit their own config; the file is damaged or too new")
     model.eval().requires_grad_(False)
@@ -94,7 +109,9 @@ def _fill(model: Model, tensors: dict[str, Tensor], path: Path) -> Model:
     return model
 
 
-def _read(path: Path, kind: str | None = None, weights: bool = False) -> tuple[Card, dict[str, Tensor]]:
+def _read(
+    path: Path, kind: str | None = None, weights: bool = False, configs: Mapping[str, type] = CONFIGS
+) -> tuple[Card, dict[str, Tensor]]:
     try:
         with safe_open(str(path), framework="pt") as file:
             metadata = file.metadata() or {}
@@ -102,21 +119,20 @@ def _read(path: Path, kind: str | None = None, weights: bool = False) -> tuple[C
                 raise PlaygroundError(f"{path} has checkpoint format {metadata['format']}, this version reads {FORMAT}")
             names = [name for name in file.keys() if weights or name.startswith("normaliser.")]  # noqa: SIM118
             tensors = {name: file.get_tensor(name) for name in names}
-        card = _card(metadata, tensors, hashlib.sha256(path.read_bytes()).hexdigest())
+        if kind is not None and metadata["kind"] != kind:
+            raise PlaygroundError(f"{path} is a {metadata['kind']} checkpoint, a {kind} is needed here")
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        card = _card(metadata, tensors, digest, configs[metadata["kind"]])
     except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, PlaygroundError):
             raise
         raise PlaygroundError(
             f"{path} is not a checkpoint of the playground (a .safetensors file with a card)"
         ) from error
-    if kind is not None and card.kind != kind:
-        raise PlaygroundError(f"{path} is a {card.kind} checkpoint, a {kind} is needed here")
     return card, tensors
 
 
-def _card(metadata: dict[str, str], tensors: dict[str, Tensor], digest: str) -> Card:
-    kinds: dict[str, type] = {"tokenizer": TokenizerConfig, "generator": GeneratorConfig}
-    config_type = kinds[metadata["kind"]]
+def _card(metadata: dict[str, str], tensors: dict[str, Tensor], digest: str, config_type: type) -> Card:
     raw = json.loads(metadata["config"])
     known = {field.name for field in fields(config_type)}
     config = config_type(**{k: tuple(v) if isinstance(v, list) else v for k, v in raw.items() if k in known})
