@@ -8,7 +8,9 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from playground.errors import PlaygroundError
 
 # Neutral tokens: name -> (light, dark). Text on its ground keeps a contrast of 4.5 or more in both.
 TOKENS: dict[str, tuple[str, str]] = {
@@ -116,6 +118,26 @@ def rgb_to_oklab(rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
     return np.asarray(np.cbrt(_decode(rgb) @ _TO_LMS.T) @ _TO_LAB.T)
 
 
+def code_colors(codebook: ArrayLike) -> NDArray[np.uint8]:
+    """Colours of a codebook [V, D] -> uint8 [V, 3]: near codes look near, equal codes are equal.
+
+    First principal component to hue, second to lightness (both by rank, so that colours spread evenly), in OKLCH.
+    Lightness stays between 0.62 and 0.86: it shows on a light and on a dark page, and dark digits read on all of it.
+    PlaygroundError if the codebook is not a finite matrix.
+    """
+    codes = np.asarray(codebook, np.float64)
+    if codes.ndim != 2 or not codes.size or not np.isfinite(codes).all():
+        raise PlaygroundError(f"a codebook must be a finite matrix [codes, width], got {list(codes.shape)}")
+    centred = codes - codes.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    axes = axes[:, ::-1][:, :2]
+    strongest = np.abs(axes).argmax(axis=0)
+    axes = axes * np.where(axes[strongest, np.arange(axes.shape[1])] < 0, -1.0, 1.0)
+    places = [_rank(column) for column in (centred @ axes).T]
+    first, second = places[0], places[1] if len(places) > 1 else np.full(len(codes), 0.5)
+    return oklch_to_rgb(0.62 + 0.24 * second, np.full(len(codes), 0.125), np.deg2rad(25.0 + 305.0 * first))
+
+
 def css_variables() -> str:
     """The neutral tokens as CSS custom properties --mtp-*, light on :root and dark under .dark."""
     blocks = []
@@ -124,6 +146,15 @@ def css_variables() -> str:
         blocks.append(f"{selector}{{{lines}}}")
     sans = ", ".join(f'"{font}"' if " " in font else font for font in FONTS)
     return "\n".join([*blocks, f":root{{--mtp-sans:{sans};--mtp-radius:4px;}}"])
+
+
+def _rank(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Place of each value among the distinct values, 0 to 1; 0.5 where all are equal."""
+    spread = float(values.max() - values.min())
+    if spread <= 1e-9 * max(1.0, float(np.abs(values).max())):
+        return np.full(len(values), 0.5)
+    distinct, inverse = np.unique(np.round(values / spread, 9), return_inverse=True)
+    return np.asarray(inverse / (len(distinct) - 1), np.float64)
 
 
 _TO_LMS = np.array(

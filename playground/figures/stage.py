@@ -12,36 +12,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from playground.errors import PlaygroundError
-from playground.figures.colors import oklch_to_rgb, system_color
+from playground.figures.colors import code_colors, system_color
 from playground.limits import LIMITS
 from playground.motion.skeleton import HUMAN22
 
 VERSION = 1
 ORIGINAL_ID = "original"
 NOT_FRAMES = "latents are not frames by construction: a cell shows its share of time, not which frames it governs"
+MAX_STRIP_ROWS = 96  # words of the longest prompt, or joints
 _MAX_CODES = 32_768  # ids travel as int16
 _COLUMNS = 4 + 3 * (HUMAN22.size - 1)
+_SIDE = ("{}_collar", "{}_shoulder", "{}_elbow", "{}_wrist"), ("{}_hip", "{}_knee", "{}_ankle", "{}_foot")
+BODY_PARTS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("head", ("head", "neck")),
+    ("trunk", ("spine3", "spine2", "spine1", "pelvis")),
+    *(
+        (f"{side} {limb}", tuple(name.format(side[0]) for name in names))
+        for limb, names in zip(("arm", "leg"), _SIDE, strict=True)
+        for side in ("left", "right")
+    ),
+)
 Json = dict[str, Any]
-
-
-def code_colors(codebook: ArrayLike) -> NDArray[np.uint8]:
-    """Colours of a codebook [V, D] -> uint8 [V, 3]: near codes look near, equal codes are equal.
-
-    First principal component to hue, second to lightness (both by rank, so that colours spread evenly), in OKLCH.
-    Lightness stays between 0.62 and 0.86: it shows on a light and on a dark page, and dark digits read on all of it.
-    PlaygroundError if the codebook is not a finite matrix.
-    """
-    codes = np.asarray(codebook, np.float64)
-    if codes.ndim != 2 or not codes.size or not np.isfinite(codes).all():
-        raise PlaygroundError(f"a codebook must be a finite matrix [codes, width], got {list(codes.shape)}")
-    centred = codes - codes.mean(axis=0)
-    _, axes = np.linalg.eigh(centred.T @ centred)
-    axes = axes[:, ::-1][:, :2]
-    strongest = np.abs(axes).argmax(axis=0)
-    axes = axes * np.where(axes[strongest, np.arange(axes.shape[1])] < 0, -1.0, 1.0)
-    places = [_rank(column) for column in (centred @ axes).T]
-    first, second = places[0], places[1] if len(places) > 1 else np.full(len(codes), 0.5)
-    return oklch_to_rgb(0.62 + 0.24 * second, np.full(len(codes), 0.125), np.deg2rad(25.0 + 305.0 * first))
 
 
 def figure(
@@ -80,16 +71,19 @@ def level(
     entropy: ArrayLike | None = None,
     size: int | None = None,
     spans: ArrayLike | None = None,
+    marks: ArrayLike | None = None,
 ) -> Json:
     """One row of the score: ids [s] of a codebook with `codes` entries, its colours uint8 [codes, 3] from code_colors
-    (None: by index), entropy [s] in nats, spans [s, 2] measured first and last+1 frame of each token.
+    (None: by index), entropy [s] in nats, spans [s, 2] measured first and last+1 frame of each token, marks bool [s]
+    of the tokens to be marked (the track says what for).
 
     ids None with a size is a row that is still to come: it is drawn empty.
     """
     if ids is None:
         if size is None or size < 1:
             raise PlaygroundError("a level without ids needs its size")
-        return {"size": int(size), "codes": int(codes), "ids": None, "colors": None, "entropy": None, "spans": None}
+        nothing = dict.fromkeys(("ids", "colors", "entropy", "spans", "marks"))
+        return {"size": int(size), "codes": int(codes), **nothing}
     row = np.asarray(ids)
     if row.ndim != 1 or not row.size or not np.issubdtype(row.dtype, np.integer):
         raise PlaygroundError(f"a level's ids must be a row of whole numbers, got shape {list(row.shape)}")
@@ -105,17 +99,78 @@ def level(
         "colors": _base64(palette[row], "u1"),
         "entropy": None if entropy is None else _base64(_row_of(entropy, (len(row),), "entropy"), "<f4"),
         "spans": None if spans is None else _base64(_row_of(spans, (len(row), 2), "spans"), "<i2"),
+        "marks": None if marks is None else _base64(_row_of(marks, (len(row),), "marks") != 0, "u1"),
     }
 
 
-def track(system: str, name: str, frames: int, levels: Sequence[Json], note: str = "") -> Json:
+def track(system: str, name: str, frames: int, levels: Sequence[Json], note: str = "", marked: str = "changed") -> Json:
     """One system's rows, coarse first. frames is the length of the motion that they stand for; note goes to the header,
-    e.g. NOT_FRAMES."""
+    e.g. NOT_FRAMES; marked says in a few words what the marks of its levels mean."""
     if frames < 1 or not levels:
         raise PlaygroundError(f'track "{name}" needs at least one frame and one level')
     color = system_color(system)
     block: Json = {"system": system, "name": name, "color": color.light, "dark_color": color.dark}
-    return {**block, "frames": int(frames), "note": note, "levels": list(levels)}
+    return {**block, "frames": int(frames), "note": note, "marked": marked, "levels": list(levels)}
+
+
+def strip(
+    id: str,
+    name: str,
+    unit: str,
+    rows: Sequence[str],
+    values: ArrayLike,
+    max: float | None = None,
+    groups: Sequence[tuple[str, int]] = (),
+    joints: Sequence[int] = (),
+) -> Json:
+    """A heat map under the score, on its time axis: values [rows, frames], 0 or more, named rows, a unit ("" for a
+    share), `max` for the end of the colour ramp (None: the largest value).
+
+    groups: (name, rows) one after the other, for rows too many to be named one by one; joints: the joint of each row,
+    which the figures light up when the row is pointed at.
+    """
+    array = np.asarray(values, np.float64)
+    if array.ndim != 2 or array.shape[0] != len(rows) or not 1 <= len(rows) <= MAX_STRIP_ROWS or not array.shape[1]:
+        raise PlaygroundError(
+            f'strip "{name}" needs values [rows, frames] for 1 to {MAX_STRIP_ROWS} named rows, got '
+            f"{list(array.shape)} for {len(rows)} names"
+        )
+    if not np.isfinite(array).all() or array.min() < 0 or (max is not None and not 0 < max < np.inf):
+        raise PlaygroundError(f'strip "{name}" needs finite values of 0 or more, and a largest value above 0')
+    if (groups and sum(count for _, count in groups) != len(rows)) or (joints and len(joints) != len(rows)):
+        raise PlaygroundError(f'the groups and joints of strip "{name}" must cover its {len(rows)} rows')
+    if any(not 0 <= joint < HUMAN22.size for joint in joints):
+        raise PlaygroundError(f'the joints of strip "{name}" must lie in 0..{HUMAN22.size - 1}')
+    return {
+        "id": id,
+        "name": name,
+        "unit": unit,
+        "rows": list(rows),
+        "values": _base64(array, "<f4"),
+        "max": float(max if max is not None else array.max() or 1.0),
+        "groups": [[group, int(count)] for group, count in groups],
+        "joints": [int(joint) for joint in joints],
+    }
+
+
+def joint_strip(id: str, name: str, difference: ArrayLike, max_mm: float | None = None) -> Json:
+    """Joints-by-frames heat map of a difference [frames, 22] in metres: rows by body part, values in millimetres."""
+    array = np.asarray(difference, np.float64)
+    if array.ndim != 2 or array.shape[1] != HUMAN22.size:
+        raise PlaygroundError(f'strip "{name}" needs a difference [frames, {HUMAN22.size}], got {list(array.shape)}')
+    joints = [HUMAN22.index(joint) for _, members in BODY_PARTS for joint in members]
+    names = [HUMAN22.joints[joint].replace("l_", "left ").replace("r_", "right ") for joint in joints]
+    groups = [(part, len(members)) for part, members in BODY_PARTS]
+    return strip(id, name, "mm", names, 1000 * array.T[joints], max_mm, groups, joints)
+
+
+def spans_of(kept: ArrayLike) -> list[tuple[int, int]]:
+    """Runs of True in a row of bools [frames] as (first, last+1): what payload() takes as hatch."""
+    row = np.asarray(kept)
+    if row.ndim != 1 or row.dtype != np.bool_:
+        raise PlaygroundError(f"kept frames must be a row of true and false, got {row.dtype} {list(row.shape)}")
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]]).astype(np.int8)))
+    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
 def features(
@@ -151,8 +206,15 @@ def payload(
     features: Json | None = None,
     badge: Json | None = None,
     fps: int = LIMITS.fps,
+    strips: Sequence[Json] = (),
+    hatch: Sequence[tuple[int, int]] = (),
+    hatched: str = "kept as it was",
 ) -> Json:
-    """The whole stage, checked. PlaygroundError if figures are none or too many, ids repeat or point nowhere."""
+    """The whole stage, checked. strips: heat maps under the score; hatch: spans (first, last+1 frame) that are hatched
+    on timeline and score, and `hatched` what that means.
+
+    PlaygroundError if figures are none or too many, ids repeat or point nowhere, spans are not in order.
+    """
     ids = [block["id"] for block in figures]
     if not 1 <= len(ids) <= LIMITS.max_figures:
         raise PlaygroundError(f"a stage shows 1 to {LIMITS.max_figures} figures, got {len(ids)}")
@@ -168,6 +230,15 @@ def payload(
     if features is not None and features["figure"] not in ids:
         raise PlaygroundError(f'the features belong to figure "{features["figure"]}", which is not there')
     longest = max(block["frames"] for block in (*figures, *tracks))
+    if len({block["id"] for block in strips}) != len(strips):
+        raise PlaygroundError("two strips of one stage have the same id")
+    edges = [edge for span in hatch for edge in span]
+    if (
+        any(len(span) != 2 for span in hatch)
+        or edges != sorted(set(edges))
+        or any(not 0 <= e <= longest for e in edges)
+    ):
+        raise PlaygroundError(f"hatched spans must be (first, last+1) in order and apart, within 0..{longest}")
     return {
         "version": VERSION,
         "fps": int(fps),
@@ -177,6 +248,9 @@ def payload(
         "tracks": list(tracks),
         "features": features,
         "badge": badge,
+        "strips": list(strips),
+        "hatch": [[int(start), int(stop)] for start, stop in hatch],
+        "hatched": hatched,
     }
 
 
@@ -185,15 +259,6 @@ def message(state: str, text: str) -> Json:
     if state not in ("loading", "error", "empty"):
         raise PlaygroundError(f'a stage message is "loading", "error" or "empty", got "{state}"')
     return {"version": VERSION, "state": state, "message": text}
-
-
-def _rank(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Place of each value among the distinct values, 0 to 1; 0.5 where all are equal."""
-    spread = float(values.max() - values.min())
-    if spread <= 1e-9 * max(1.0, float(np.abs(values).max())):
-        return np.full(len(values), 0.5)
-    distinct, inverse = np.unique(np.round(values / spread, 9), return_inverse=True)
-    return np.asarray(inverse / (len(distinct) - 1), np.float64)
 
 
 def _row_of(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:

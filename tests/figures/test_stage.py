@@ -69,6 +69,51 @@ def test_features_travel_and_figures_may_follow_them() -> None:
     assert made["features"]["guidance"] == 3.0
 
 
+def test_marks_travel_with_their_meaning() -> None:
+    row = stage.level([1, 2, 3], 10, marks=np.array([True, False, True]))
+    made = stage.track("lgtok-lite", "LG-Tok", 6, [row, stage.level([4], 10)], marked="differs without the caption")
+    assert decoded(made["levels"][0]["marks"], "u1").tolist() == [1, 0, 1]
+    assert made["levels"][1]["marks"] is None and made["marked"] == "differs without the caption"
+
+
+def test_a_strip_gives_back_its_values_and_its_largest() -> None:
+    values = RNG.uniform(size=(3, 7)).astype(np.float32)
+    made = stage.strip("attention", "Attention", "", ["a", "person", "waves"], values)
+    assert np.array_equal(decoded(made["values"], "<f4").reshape(3, 7), values)
+    assert made["max"] == pytest.approx(values.max()) and made["rows"] == ["a", "person", "waves"]
+    assert stage.strip("a", "A", "mm", ["x"], np.zeros((1, 4)))["max"] == 1.0
+    assert stage.strip("a", "A", "mm", ["x"], np.zeros((1, 4)), max=30)["max"] == 30.0
+
+
+def test_a_joint_strip_orders_every_joint_by_its_part_of_the_body_in_millimetres() -> None:
+    difference = RNG.uniform(size=(5, 22))
+    made = stage.joint_strip("swap", "Difference", difference)
+    rows = decoded(made["values"], "<f4").reshape(22, 5)
+    assert sorted(made["joints"]) == list(range(22)) and sum(count for _, count in made["groups"]) == 22
+    for row, joint, name in zip(rows, made["joints"], made["rows"], strict=True):
+        assert np.allclose(row, 1000 * difference[:, joint])
+        assert name.replace("left ", "l_").replace("right ", "r_") == HUMAN22.joints[joint]
+    at = 0
+    for group, count in made["groups"]:
+        sides = {name.split()[0] for name in made["rows"][at : at + count]} & {"left", "right"}
+        assert sides == {group.split()[0]} & {"left", "right"}
+        at += count
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.booleans(), max_size=30))
+def test_spans_of_kept_frames_give_back_the_same_frames(kept: list[bool]) -> None:
+    spans = stage.spans_of(np.array(kept, bool))
+    back = np.zeros(len(kept), bool)
+    for start, stop in spans:
+        assert start < stop and not back[max(start - 1, 0) : stop].any()
+        back[start:stop] = True
+    assert back.tolist() == kept
+    if kept:
+        made = stage.payload([figure("a", len(kept))], hatch=spans, strips=[stage.strip("s", "S", "", ["x"], [[1.0]])])
+        assert made["hatch"] == [list(span) for span in spans] and made["strips"][0]["id"] == "s"
+
+
 def test_the_largest_stage_stays_small() -> None:
     figures = [figure(str(n), LIMITS.max_frames + 1) for n in range(LIMITS.max_figures)]
     assert len(json.dumps(stage.payload(figures))) < 600_000
@@ -95,6 +140,21 @@ BAD: dict[str, Any] = {
     "features of two lengths": lambda: stage.features(
         "a", np.zeros((3, 67)), np.zeros((4, 67)), np.zeros(67), np.ones(67)
     ),
+    "marks too short": lambda: stage.level([0, 1], 10, marks=[True]),
+    "strip below zero": lambda: stage.strip("s", "S", "mm", ["x"], [[-1.0]]),
+    "strip not finite": lambda: stage.strip("s", "S", "mm", ["x"], [[np.nan]]),
+    "strip without frames": lambda: stage.strip("s", "S", "mm", ["x"], np.zeros((1, 0))),
+    "strip without rows": lambda: stage.strip("s", "S", "mm", [], np.zeros((0, 4))),
+    "strip with other names": lambda: stage.strip("s", "S", "mm", ["x"], np.zeros((2, 4))),
+    "strip with no end of its ramp": lambda: stage.strip("s", "S", "mm", ["x"], [[1.0]], max=0),
+    "strip with groups of other rows": lambda: stage.strip("s", "S", "mm", ["x"], [[1.0]], groups=[("a", 2)]),
+    "strip with a joint that is not there": lambda: stage.strip("s", "S", "mm", ["x"], [[1.0]], joints=[22]),
+    "difference of other joints": lambda: stage.joint_strip("s", "S", np.zeros((4, 21))),
+    "two strips of one id": lambda: stage.payload([figure()], strips=[stage.strip("s", "S", "", ["x"], [[1.0]])] * 2),
+    "hatch past the end": lambda: stage.payload([figure()], hatch=[(2, 6)]),
+    "hatch of no length": lambda: stage.payload([figure()], hatch=[(2, 2)]),
+    "hatch out of order": lambda: stage.payload([figure()], hatch=[(3, 4), (0, 1)]),
+    "kept frames that are numbers": lambda: stage.spans_of([0, 1]),
     "badge": lambda: stage.badge("new"),
     "message": lambda: stage.message("ready", ""),
     "no figure": lambda: stage.payload([]),
