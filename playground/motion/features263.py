@@ -52,11 +52,14 @@ def chain_rotations(joints: Array, root: Array) -> Array:
     return local
 
 
-def to_features263(joints: Array) -> NDArray[np.float32]:
-    """Canonical joints [F, 22, 3] in metres -> float32 [F-1, 263]. PlaygroundError for fewer than two poses."""
-    first = to_features67(joints)
+def to_features263(joints: Array, rule: str = "body") -> NDArray[np.float32]:
+    """Canonical joints [F, 22, 3] in metres -> float32 [F-1, 263]. PlaygroundError for fewer than two poses.
+
+    rule: how the heading is read off the body; "humanml3d" gives the columns of HumanML3D's released extraction.
+    """
+    first = to_features67(joints, rule)
     joints = np.asarray(joints, np.float64)
-    turn = yaw_quaternion(heading(joints))
+    turn = yaw_quaternion(heading(joints, rule=rule))
     rotations = matrix_to_6d(quaternion_to_matrix(chain_rotations(joints, turn)[:-1, 1:]))
     steps = np.diff(joints, axis=0)
     velocities = qrotate(turn[:-1, None], steps)

@@ -19,22 +19,33 @@ from playground.motion.skeleton import ACROSS, HUMAN22
 COLUMNS = 4 + 3 * (HUMAN22.size - 1)  # 67
 GROUPS: tuple[tuple[int, ...], ...] = ((0,), (1, 2), (3,), tuple(range(4, COLUMNS)))  # columns that share one std
 HEADING_SIGMA = 20.0  # frames; HumanML3D smooths the facing direction with it
+HEADINGS = ("body", "humanml3d")  # rules of the smoothed heading; see `facing`
 
 Array = NDArray[np.floating]
 
 
-def facing(joints: Array) -> NDArray[np.float64]:
-    """Horizontal unit facing [F, 3] of joints [F, 22, 3]: up x ((r_hip - l_hip) + (r_shoulder - l_shoulder))."""
+def facing(joints: Array, rule: str = "body") -> NDArray[np.float64]:
+    """Horizontal facing [F, 3] of joints [F, 22, 3]: up x across, by one of two rules for across.
+
+    body: (r_shoulder - l_shoulder) + (r_hip - l_hip), the facing at length 1 (A1). humanml3d: shoulders minus hips at
+    length 1 in space, as HumanML3D's released extraction computes it: it exchanges the names of the hips.
+    """
     right_hip, left_hip, right_shoulder, left_shoulder = (joints[:, j].astype(np.float64) for j in ACROSS)
-    across = right_hip - left_hip + right_shoulder - left_shoulder
+    shoulders, hips = right_shoulder - left_shoulder, right_hip - left_hip
+    across = shoulders - hips if rule == "humanml3d" else shoulders + hips
     direction = np.stack([across[:, 2], np.zeros(len(across)), -across[:, 0]], axis=-1)
-    norm = np.linalg.norm(direction, axis=-1, keepdims=True)
+    norm = np.linalg.norm(across if rule == "humanml3d" else direction, axis=-1, keepdims=True)
     return np.where(norm > 1e-9, direction / np.maximum(norm, 1e-9), np.array([0.0, 0.0, 1.0]))
 
 
-def heading(joints: Array, smooth: bool = True) -> NDArray[np.float64]:
-    """Yaw [F] in radians that turns each frame's facing direction to +Z; frame 0 is exactly 0 when smoothed (A1)."""
-    raw = facing(joints)
+def heading(joints: Array, smooth: bool = True, rule: str = "body") -> NDArray[np.float64]:
+    """Yaw [F] in radians that turns each frame's facing direction to +Z; frame 0 is exactly 0 when smoothed (A1).
+
+    rule: one of HEADINGS; ValueError for another.
+    """
+    if rule not in HEADINGS:
+        raise ValueError(f"unknown heading rule {rule!r}; accepted: {', '.join(HEADINGS)}")
+    raw = facing(joints, rule)
     direction = gaussian_filter1d(raw, HEADING_SIGMA, axis=0, mode="nearest", truncate=4.0) if smooth else raw
     yaw = np.asarray(-np.arctan2(direction[:, 0], direction[:, 2]), np.float64)
     if smooth:
@@ -50,12 +61,15 @@ def canonicalise(joints: Array) -> NDArray[np.float32]:
     return (turned - shift).astype(np.float32)
 
 
-def to_features67(joints: Array) -> NDArray[np.float32]:
-    """Canonical joints [F, 22, 3] in metres -> float32 [F-1, 67]. PlaygroundError for fewer than two poses."""
+def to_features67(joints: Array, rule: str = "body") -> NDArray[np.float32]:
+    """Canonical joints [F, 22, 3] in metres -> float32 [F-1, 67]. PlaygroundError for fewer than two poses.
+
+    rule: how the heading is read off the body (`facing`); recovery is the same for every rule.
+    """
     if len(joints) < 2:
         raise PlaygroundError("a motion needs at least 2 poses to be turned into feature rows")
     joints = np.asarray(joints, np.float64)
-    yaw = heading(joints)
+    yaw = heading(joints, rule=rule)
     turn = yaw_quaternion(yaw)
     step = np.diff(yaw)
     half_turn = ((step + np.pi) % (2 * np.pi) - np.pi) / 2.0
