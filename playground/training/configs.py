@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from playground.data.batches import BatchConfig
 from playground.errors import PlaygroundError
+from playground.evaluation.networks import EvaluatorConfig
 from playground.generators.scalewise import GENERATOR_PRESETS, GeneratorConfig
 from playground.tokenizers.transformer import PRESETS, TokenizerConfig
 
@@ -74,6 +75,38 @@ GENERATORS: dict[str, GeneratorTraining] = {
         tokenizer="lgtok-lite-tokenizer",
         batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
         schedule=Schedule(steps=2_600, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class EvaluatorTraining:
+    """One evaluator run (systems.md E5, F1); the size of the contrastive batch is `batch.size` (LG-Tok, Table 6)."""
+
+    model: EvaluatorConfig
+    batch: BatchConfig = field(default_factory=BatchConfig)
+    schedule: Schedule = field(default_factory=Schedule)
+    text: str = "minilm"
+    synthetic: float = 0.0
+    reconstruction: float = 1.0  # the four weights of E5, TMR style only
+    divergence: float = 1e-5
+    latent: float = 1e-5
+    contrast: float = 0.1
+    temperature: float = 0.1  # of the TMR style; the CLIP style learns its own
+    alike: float = 0.999  # captions with a cosine of at least this are no negatives; above 1 every other one is
+    seed: int = 0
+
+
+EVALUATORS: dict[str, EvaluatorTraining] = {
+    "tmr-evaluator": EvaluatorTraining(
+        model=EvaluatorConfig(kind="tmr"),
+        batch=BatchConfig(size=64, whole=0.9, source_balance=0.3, action_balance=0.0, bucket=2),
+        schedule=Schedule(steps=1_500, rate=5e-4, weight_decay=1e-2, clip=1.0, warmup=100, fall=0.6),
+    ),
+    "clip-evaluator": EvaluatorTraining(
+        model=EvaluatorConfig(kind="clip"),
+        batch=BatchConfig(size=64, whole=0.9, source_balance=0.3, action_balance=0.0, bucket=2),
+        schedule=Schedule(steps=1_500, rate=5e-4, weight_decay=1e-2, clip=1.0, warmup=100, fall=0.6),
     ),
 }
 

@@ -11,6 +11,7 @@ from playground.checkpoints import load_tokenizer
 from playground.data.batches import BatchConfig, BatchSource, library_samples, synthetic_samples, whole_batches
 from playground.data.library import Library
 from playground.errors import PlaygroundError
+from playground.evaluation.networks import build_evaluator
 from playground.generators.scalewise import GeneratorConfig, build_generator
 from playground.motion.representation import Normaliser
 from playground.motion.synthetic import corpus
@@ -18,10 +19,21 @@ from playground.progress import Progress
 from playground.text.encoders import check_same, load_encoder
 from playground.text.store import FeatureStore
 from playground.tokenizers.transformer import LGTok, build_tokenizer
-from playground.training.configs import GENERATORS, TOKENIZERS, GeneratorTraining, TokenizerTraining, with_steps
+from playground.training.configs import (
+    EVALUATORS,
+    GENERATORS,
+    TOKENIZERS,
+    EvaluatorTraining,
+    GeneratorTraining,
+    TokenizerTraining,
+    with_steps,
+)
+from playground.training.evaluator import EvaluatorTask
 from playground.training.generator import GeneratorTask, build_bank
 from playground.training.loop import Launch, Task, fit, start_fabric
 from playground.training.tokenizer import TokenizerTask
+
+Training = TokenizerTraining | GeneratorTraining | EvaluatorTraining
 
 
 @dataclass(frozen=True)
@@ -35,7 +47,7 @@ class Order:
     launch: Launch
     on_step: Callable[[int, float], None] | None
 
-    def fit(self, fabric: Any, task: Task, config: TokenizerTraining | GeneratorTraining, out: Path) -> dict[str, Any]:
+    def fit(self, fabric: Any, task: Task, config: Training, out: Path) -> dict[str, Any]:
         """Train, with the number of steps asked for."""
         schedule = with_steps(config.schedule, self.steps)
         return fit(fabric, task, schedule, out, seed=config.seed, resume=self.resume, on_step=self.on_step)
@@ -60,12 +72,13 @@ def train(
         return _train_tokenizer(TOKENIZERS[config], order)
     if config in GENERATORS:
         return _train_generator(GENERATORS[config], order)
-    raise PlaygroundError(f"unknown training {config!r}; known are {', '.join([*TOKENIZERS, *GENERATORS])}")
+    if config in EVALUATORS:
+        return _train_evaluator(EVALUATORS[config], order)
+    known = ", ".join([*TOKENIZERS, *GENERATORS, *EVALUATORS])
+    raise PlaygroundError(f"unknown training {config!r}; known are {known}")
 
 
-def training_batches(
-    library: Library, config: TokenizerTraining | GeneratorTraining, normaliser: Normaliser
-) -> BatchSource:
+def training_batches(library: Library, config: Training, normaliser: Normaliser) -> BatchSource:
     """Batches over the training split plus a share of the synthetic corpus."""
     samples = library_samples(library, "train")
     if not samples:
@@ -120,6 +133,24 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
     task = GeneratorTask(
         model, tokenizer.quantizer, config, bank, checked, store, encoder, library.name, card.hash[:12], fabric.device
     )
+    return order.fit(fabric, task, config, out)
+
+
+def _train_evaluator(config: EvaluatorTraining, order: Order) -> dict[str, Any]:
+    with_steps(config.schedule, order.steps)
+    library, out = Library.open(order.library), order.out / config.model.kind
+    fabric = start_fabric(order.launch, out)
+    encoder = load_encoder(config.text)
+    clips = library.split("train") or list(range(len(library)))
+    normaliser = Normaliser.fit((library.features(i) for i in clips), groups=())
+    batches = training_batches(library, config, normaliser)
+    held_out = {split: library_samples(library, split) for split in ("val", "test")}
+    own = (caption for samples in held_out.values() for sample in samples for caption in sample.captions)
+    store = FeatureStore.cached(order.library, [*batches.captions(), *own, ""], encoder)
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        network = build_evaluator(replace(config.model, text_width=encoder.width))
+    task = EvaluatorTask(network, config, batches, held_out, store, encoder, library.name, fabric.device)
     return order.fit(fabric, task, config, out)
 
 
