@@ -1,10 +1,8 @@
 """The one training loop, on Lightning Fabric: CPU, one GPU or several machines, resumable at any saved step."""
 
 import json
-import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,6 +13,7 @@ from torch import Tensor, nn
 from tqdm import tqdm
 
 from playground.errors import PlaygroundError
+from playground.launch import Launch, launch_fabric
 from playground.training.configs import Schedule, rate_at
 from playground.training.state import load_state, save_state
 
@@ -40,36 +39,9 @@ class Task(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Launch:
-    """Where a run computes. Under torchrun, devices and nodes come from its environment."""
-
-    accelerator: str = "auto"
-    devices: int | str = "auto"
-    nodes: int = 1
-    strategy: str = "auto"
-    precision: str = "auto"  # auto: bf16-mixed on CPU and GPU; 32-true turns mixed precision off
-
-
 def start_fabric(launch: Launch, out: Path) -> Fabric:
     """A launched Fabric that logs to TensorBoard under `out`."""
-    precision = "bf16-mixed" if launch.precision == "auto" else launch.precision
-    devices, nodes = launch.devices, launch.nodes
-    if "LOCAL_WORLD_SIZE" in os.environ:  # started by torchrun, which has decided already
-        devices = int(os.environ["LOCAL_WORLD_SIZE"])
-        nodes = int(os.environ["WORLD_SIZE"]) // devices
-    elif devices == "auto":
-        devices = 1
-    fabric = Fabric(
-        accelerator=launch.accelerator,
-        devices=devices,
-        num_nodes=nodes,
-        strategy=launch.strategy,
-        precision=precision,  # type: ignore[arg-type]
-        loggers=TensorBoardLogger(out, name="tensorboard", version=""),
-    )
-    fabric.launch()
-    return fabric
+    return launch_fabric(launch, [TensorBoardLogger(out, name="tensorboard", version="")])
 
 
 def fit(
