@@ -1,8 +1,9 @@
 """The loaded models of one system behind numpy arrays: what the engine calls. The one place where torch meets numpy."""
 
+import copy
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from torch import Tensor
 
 from playground.checkpoints import load_generator, load_tokenizer
 from playground.errors import PlaygroundError
+from playground.generators.base import Step
 from playground.generators.scalewise import ScalewiseGenerator
 from playground.motion.representation import Normaliser
 from playground.nn.sampling import Sampling
@@ -107,6 +109,49 @@ class Runtime:
         text = None if prompt is None else self.text(prompt)
         for step in self.generator.steps(text, torch.tensor([frames]), Sampling(**sampling)):
             yield DrawnScale(step.level, level_tokens(step.tokens), step.entropy[0].numpy(), step.embedding)
+
+    # ---- many at once, for evaluation -----------------------------------------------------------------------------
+
+    def texts(self, captions: Sequence[str]) -> TextFeatures | None:
+        """Features of the captions of one batch; None where all are empty. PlaygroundError if only some are."""
+        if any(captions) != all(captions):
+            raise PlaygroundError("a batch holds captions or none; some of these are empty")
+        return self.encoder.encode(captions).to(self.device) if any(captions) else None
+
+    def generate_batch(
+        self, captions: Sequence[str], frames: Sequence[int], seeds: Sequence[int], sampling: dict[str, Any]
+    ) -> Step:
+        """Draw a batch, all scales; a motion's draws follow its own seed. Empty captions draw free-form.
+
+        PlaygroundError if the system has no generator.
+        """
+        if self.generator is None:
+            raise PlaygroundError(f"the system {self.name} has no generator; it can tokenize and decode only")
+        how = Sampling(**sampling, seeds=tuple(seeds))
+        return self.generator.generate(self.texts(captions), torch.tensor(frames, device=self.device), how)
+
+    def decode_batch(
+        self, embedding: Tensor, frames: Sequence[int], captions: Sequence[str], guidance: float
+    ) -> list[Floats]:
+        """Embedding [B, T, D] -> un-normalised rows [F_b, 67] of every motion."""
+        lengths = torch.tensor(frames, device=self.device)
+        decoded = self.tokenizer.decode(embedding, lengths, self.texts(captions), guidance).cpu().numpy()
+        return [self.normaliser.invert(rows[:count]) for rows, count in zip(decoded, frames, strict=True)]
+
+    @property
+    def device(self) -> torch.device:
+        """Where the models compute."""
+        return self.tokenizer.quantizer.codebooks[0].vectors.device
+
+    def to(self, device: torch.device) -> "Runtime":
+        """The same system with its models copied to another device, for the batch calls; itself if it is there."""
+        if device == self.device:
+            return self
+        tokenizer = copy.deepcopy(self.tokenizer).to(device)
+        generator = self.generator
+        if generator is not None:
+            generator = ScalewiseGenerator(copy.deepcopy(generator.transformer).to(device), tokenizer.quantizer)
+        return replace(self, tokenizer=tokenizer, generator=generator)
 
 
 def level_tokens(tokens: Tokens) -> tuple[LevelTokens, ...]:

@@ -218,7 +218,7 @@ class ScalewiseGenerator:
         guided = text is not None and sampling.cfg != 0
         memory = net.remember(text, lengths, null=guided)
         cache = KeyValueCache()
-        rng = torch.Generator().manual_seed(sampling.seed)
+        rng = sampling.rng()
         total = torch.zeros(len(lengths), quantizer.length, net.config.code_width, device=lengths.device)
         drawn: list[Tensor] = []
         for level in range(len(quantizer.scales)):
@@ -257,11 +257,16 @@ class ScalewiseGenerator:
     @torch.no_grad()
     def score(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
         """Log-probability [B, s_n] of every given token, one array a level, teacher-forced, without guidance."""
-        logits = self.transformer(running_sums(self.quantizer, tokens), self.transformer.remember(text, lengths))
+        logits = self.logits(tokens, text, lengths)
         return [
             part.log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
             for part, ids in zip(logits, tokens.ids, strict=True)
         ]
+
+    @torch.no_grad()
+    def logits(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
+        """Logits [B, s_n, V_n] of every level, given the true coarser ones, without guidance."""
+        return self.transformer(running_sums(self.quantizer, tokens), self.transformer.remember(text, lengths))
 
 
 def running_sums(quantizer: MultiScaleQuantizer, tokens: Tokens) -> list[Tensor]:

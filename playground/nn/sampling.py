@@ -1,6 +1,6 @@
 """Drawing codes from logits: guidance, top-k share, nucleus, temperature. Randomness is an argument."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -17,6 +17,13 @@ class Sampling:
     top_k: float = 0.2  # share of the codes kept
     top_p: float = 0.95  # nucleus on what is left
     check: Callable[[], None] | None = None
+    seeds: tuple[int, ...] = ()  # one a row, in place of `seed`: each row draws as a batch of one with its seed does
+
+    def rng(self) -> torch.Generator | list[torch.Generator]:
+        """Fresh sources of randomness: one for the batch, or one a row where `seeds` are given."""
+        if self.seeds:
+            return [torch.Generator().manual_seed(seed) for seed in self.seeds]
+        return torch.Generator().manual_seed(self.seed)
 
 
 def guide(conditional: Tensor, unconditional: Tensor, scale: float) -> Tensor:
@@ -37,13 +44,21 @@ def filter_logits(logits: Tensor, top_k: float, top_p: float) -> Tensor:
     return torch.empty_like(logits).scatter_(-1, index, ordered)
 
 
-def draw(logits: Tensor, sampling: Sampling, rng: torch.Generator) -> Tensor:
-    """Codes [B, s] from guided logits [B, s, V]. The draw happens on the CPU, so a seed means the same everywhere."""
+def draw(logits: Tensor, sampling: Sampling, rng: torch.Generator | Sequence[torch.Generator]) -> Tensor:
+    """Codes [B, s] from guided logits [B, s, V], with one rng or one a row.
+
+    The draw happens on the CPU, so a seed means the same everywhere.
+    """
     if sampling.temperature <= 0:
         return logits.argmax(dim=-1)
     kept = filter_logits(logits.float().cpu() / sampling.temperature, sampling.top_k, sampling.top_p)
-    flat = kept.softmax(dim=-1).flatten(0, -2)
-    return torch.multinomial(flat, 1, generator=rng).view(logits.shape[:-1]).to(logits.device)
+    chance = kept.softmax(dim=-1)
+    if isinstance(rng, torch.Generator):
+        ids = torch.multinomial(chance.flatten(0, -2), 1, generator=rng).view(logits.shape[:-1])
+    else:
+        rows = zip(chance, rng, strict=True)
+        ids = torch.stack([torch.multinomial(row, 1, generator=one)[:, 0] for row, one in rows])
+    return ids.to(logits.device)
 
 
 def entropy_bits(logits: Tensor) -> Tensor:

@@ -163,3 +163,12 @@ def test_entropy_is_that_of_the_guided_distribution():
 def test_tokens_stay_inside_their_codebooks():
     tokens = drawn(tiny_generator(), 0, text_features((4, 2)), top_k=1.0, top_p=1.0, temperature=2.0)
     assert isinstance(tokens, Tokens) and tokens.sizes == (1, 3, 6)
+
+
+def test_rows_with_their_own_seeds_do_not_depend_on_the_batch():
+    generator, text = tiny_generator(), text_features((4, 2))
+    batch = generator.generate(text, LENGTHS, Sampling(seeds=(3, 9))).tokens
+    for row, seed in enumerate((3, 9)):
+        words = TextFeatures(text.tokens[row : row + 1], text.mask[row : row + 1], text.pooled[row : row + 1], [[]])
+        alone = generator.generate(words, LENGTHS[row : row + 1], Sampling(seed=seed)).tokens
+        assert all(torch.equal(a[row : row + 1], b) for a, b in zip(batch.ids, alone.ids, strict=True))

@@ -69,3 +69,13 @@ def test_entropy_of_a_uniform_and_of_a_sure_distribution():
 
 def test_guide_is_linear():
     assert guide(torch.tensor(2.0), torch.tensor(1.0), 3.0).item() == 5.0
+
+
+def test_a_row_with_its_own_seed_draws_as_it_does_alone():
+    logits = torch.randn(3, 9, 40, generator=torch.Generator().manual_seed(3))
+    together = Sampling(seeds=(5, 8, 5), top_k=0.9)
+    drawn = draw(logits, together, together.rng())
+    for row, seed in enumerate(together.seeds):
+        alone = Sampling(seed=seed, top_k=0.9)
+        assert torch.equal(drawn[row : row + 1], draw(logits[row : row + 1], alone, alone.rng()))
+    assert not torch.equal(drawn[0], drawn[1])
