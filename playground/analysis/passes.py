@@ -79,7 +79,8 @@ def _groups(work: list[tuple[int, int, str]], batch: int) -> Iterator[list[tuple
 def _one_batch(runtime: "Runtime", library: Library, group: list[tuple[int, int, str]]) -> Iterator[ClipPass]:
     import torch
 
-    features = [library.features(index)[:rows] for rows, index, _ in group]
+    rule = runtime.tokenizer.config.heading
+    features = [library.features(index, rule)[:rows] for rows, index, _ in group]
     lengths = torch.tensor([rows for rows, _, _ in group])
     padded = torch.zeros(len(group), int(lengths.max()), features[0].shape[1])
     for line, values in enumerate(features):

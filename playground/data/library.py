@@ -127,8 +127,10 @@ class Library:
         clip = self.clips[index]
         return np.asarray(self._joints[clip.start : clip.stop])
 
-    def features(self, index: int) -> NDArray[np.float32]:
-        """Un-normalised feature rows [F-1, 67] of one clip."""
+    def features(self, index: int, heading: str = "body") -> NDArray[np.float32]:
+        """Un-normalised feature rows [F-1, 67] of one clip; by another heading rule they are made from the joints."""
+        if heading != "body":
+            return to_features67(self.joints(index), heading)
         clip = self.clips[index]
         return np.asarray(self._features[clip.start - index : clip.stop - index - 1])
 

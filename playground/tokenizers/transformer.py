@@ -38,6 +38,7 @@ class TokenizerConfig:
     """Every number of the LG-Tok tokenizer; the defaults are the published model."""
 
     columns: int = 67  # feature columns C
+    heading: str = "body"  # rule by which the columns' heading is read off the body (motion/representation.py)
     max_frames: int = LIMITS.max_frames  # longest motion
     patch: int = 1  # frames a motion token
     width: int = 256
