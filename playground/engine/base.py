@@ -1,11 +1,4 @@
-"""The only door of the app, the command line and the notebooks: load once, run, mind the deadline. numpy throughout.
-
-    engine = default_engine()
-    tokenized = engine.tokenize(motion, "a person walks", "lgtok-lite")
-    decoded = engine.reconstruct(tokenized, guidance=2.0)
-
-torch is imported at the first call that needs a model, so that importing this module is quick.
-"""
+"""What every call of the engine rests on: systems loaded once, a motion to tokens and back, text to motion."""
 
 import json
 import threading
@@ -20,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from playground.data.examples import ExampleStore, StoredExample
+from playground.engine.checks import check_generation, check_guidance, deadline_check, prepare
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
-from playground.motion.representation import canonicalise, from_features67, to_features67
-from playground.motion.skeleton import HUMAN22
+from playground.motion.representation import from_features67
 from playground.results import Decoded, Example, Generation, GenerationStep, GuidancePair, Tokenized
 from playground.systems import SYSTEMS, SystemInfo, checkpoint_path, describe, header, row_of
 from playground.text.prompts import normalise
@@ -34,11 +27,10 @@ from playground.tokenizers.token_file import LevelTokens, TokenFile
 if TYPE_CHECKING:
     from playground.runtime import Runtime
 
-ASSETS = Path(__file__).resolve().parent.parent / "assets"
-UNIT = 4  # frames: motions are floored to a multiple of it, as in the published evaluation (A2)
+ASSETS = Path(__file__).resolve().parent.parent.parent / "assets"
 
 
-class Engine:
+class BaseEngine:
     """Loads each system once and answers from any thread; holds no state of a call."""
 
     def __init__(self, assets: Path = ASSETS) -> None:
@@ -168,7 +160,7 @@ class Engine:
         chosen = replace(row_of(system).sampling, **given)
         frames = check_generation(seconds, seed, **asdict(chosen))
         runtime = self.runtime(system)
-        check = _deadline(deadline)
+        check = deadline_check(deadline)
         sampling = {"seed": seed, **asdict(chosen)}
         guidance = sampling.pop("guidance")
         entropy: list[NDArray[np.float32]] = []
@@ -213,65 +205,6 @@ class Engine:
         return replace(self.decode(file).motion, name=entry.title)
 
 
-def prepare(motion: Motion) -> tuple[NDArray[np.float32], Motion]:
-    """A motion as un-normalised rows [F, 67], F a multiple of 4 and at most 196, and the F canonical poses of them."""
-    if motion.skeleton != HUMAN22 or motion.fps != LIMITS.fps:
-        raise PlaygroundError(
-            f"a tokenizer takes {HUMAN22.size} joints at {LIMITS.fps} frames a second, got {motion.skeleton.size}"
-            f" at {motion.fps:g}; read the file with read_motion, which converts it"
-        )
-    rows = min(motion.frames - 1, LIMITS.max_frames) // UNIT * UNIT
-    if rows < LIMITS.min_frames:
-        need = (LIMITS.min_frames + 1) / LIMITS.fps
-        raise PlaygroundError(f"the motion has {motion.seconds:.2f} s; a tokenizer needs at least {need:.2f} s")
-    joints = canonicalise(motion.joints[: rows + 1])
-    return to_features67(joints), replace(motion, joints=joints[:rows])
-
-
-def check_guidance(guidance: float, name: str = "guidance") -> None:
-    """PlaygroundError unless 0 <= guidance <= the limit."""
-    if not 0 <= guidance <= LIMITS.max_guidance:
-        raise PlaygroundError(f"{name} is {guidance:g}; 0 to {LIMITS.max_guidance:g} is accepted")
-
-
-def check_generation(
-    seconds: float, seed: int, guidance: float, cfg: float, temperature: float, top_k: float, top_p: float
-) -> int:
-    """Frames of a generation of so many seconds: floor(20 s / 4) * 4. PlaygroundError for a number out of range."""
-    if not LIMITS.min_seconds <= seconds <= LIMITS.max_seconds:
-        raise PlaygroundError(
-            f"{seconds:g} seconds were asked for; {LIMITS.min_seconds:g} to {LIMITS.max_seconds:g} are accepted"
-        )
-    if not 0 <= seed <= LIMITS.max_seed:
-        raise PlaygroundError(f"the seed must be a whole number from 0 to {LIMITS.max_seed}")
-    check_guidance(guidance)
-    check_guidance(cfg, "cfg")
-    if not 0 <= temperature <= LIMITS.max_temperature:
-        raise PlaygroundError(f"temperature is {temperature:g}; 0 to {LIMITS.max_temperature:g} is accepted")
-    for name, share in (("top_k", top_k), ("top_p", top_p)):
-        if not 0 < share <= 1:
-            raise PlaygroundError(f"{name} is {share:g}; a share above 0 and at most 1 is accepted")
-    return int(LIMITS.fps * seconds + 1e-6) // UNIT * UNIT
-
-
-def _deadline(seconds: float | None) -> Callable[[], None] | None:
-    if seconds is None:
-        return None
-    end = time.monotonic() + seconds
-
-    def check() -> None:
-        if time.monotonic() > end:
-            raise PlaygroundError(f"the request took longer than {seconds:g} s and was stopped; try a shorter motion")
-
-    return check
-
-
 @lru_cache(maxsize=4)
 def _open_examples(folder: Path, changed: int) -> ExampleStore:
     return ExampleStore.open(folder)
-
-
-@lru_cache(maxsize=1)
-def default_engine() -> Engine:
-    """The engine on the repository's own assets, one a process."""
-    return Engine()
