@@ -1,5 +1,6 @@
 """Text -> features, whichever encoder: load_encoder, and a cache in memory around any of them."""
 
+import os
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -12,17 +13,29 @@ from playground.text.features import EncoderId, TextEncoder, TextFeatures, check
 
 __all__ = ["CachedEncoder", "EncoderId", "TextEncoder", "TextFeatures", "check_same", "identify", "load_encoder"]
 
-KNOWN = '"minilm", "clip:FOLDER", "llama:FOLDER" or "t5:FOLDER"'
+KNOWN = '"minilm", "minilm-pooled", "words", "clip:FOLDER", "llama:FOLDER" or "t5:FOLDER"'
+FAMILIES = ("clip", "llama", "t5")  # encoders that a folder of the user's brings
 _LOADING = threading.Lock()
 
 
 def load_encoder(spec: str = "minilm") -> TextEncoder:
     """The encoder named by spec, loaded once a process and shared.
 
-    spec: "minilm" (the default), "clip:FOLDER", "llama:FOLDER" or "t5:FOLDER".
-    A FOLDER holds a model as transformers saves it; nothing is ever fetched.
+    spec: "minilm" (the default), "clip:FOLDER", "llama:FOLDER" or "t5:FOLDER"; "minilm-pooled" and "words" are those of
+    the text ablation (words.py).
+    A FOLDER holds a model as transformers saves it; nothing is ever fetched. "clip", "llama" and "t5" alone stand for
+    the folder that the environment variable PLAYGROUND_CLIP, PLAYGROUND_LLAMA or PLAYGROUND_T5 names.
     PlaygroundError if the name is unknown, or the files are missing or not the expected ones.
     """
+    if spec in FAMILIES:
+        variable = f"PLAYGROUND_{spec.upper()}"
+        folder = os.environ.get(variable)
+        if not folder:
+            raise PlaygroundError(
+                f"the {spec} text encoder is needed and its folder is not known; set {variable} to a folder with the"
+                " model as transformers saves it"
+            )
+        spec = f"{spec}:{folder}"
     with _LOADING:
         return _load(spec)
 
@@ -34,7 +47,11 @@ def _load(spec: str) -> TextEncoder:
         from playground.text.minilm import MiniLMEncoder
 
         return MiniLMEncoder()
-    if colon and family in ("clip", "llama", "t5"):
+    if spec in ("minilm-pooled", "words"):
+        from playground.text.words import PooledEncoder, WordNumbers
+
+        return WordNumbers() if spec == "words" else PooledEncoder(_load("minilm"))
+    if colon and family in FAMILIES:
         from playground.text.pretrained import load_pretrained
 
         return load_pretrained(family, folder)

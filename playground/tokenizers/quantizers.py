@@ -1,5 +1,7 @@
 """Vector quantization: the one nearest-code lookup, EMA codebooks, the multi-scale residual quantizer (systems.md A6).
 
+With equal scales as long as the latents, phi "identity" and the Euclidean metric it is MoMask's plain residual
+quantizer (A11, B1); noisy look-ups (`draw`) and kept prefixes (`level_drop`) are for that one.
 Ideas: VAR's multi-scale residual quantizer (MIT), EMA codebooks of VQ-VAE-2 and encodec (MIT); code written here.
 """
 
@@ -18,17 +20,24 @@ PHIS = ("conv", "residual", "identity")
 METRICS = ("cosine", "euclidean")
 
 
-def nearest_code(vectors: Tensor, codebook: Tensor, metric: str) -> Tensor:
+def nearest_code(vectors: Tensor, codebook: Tensor, metric: str, temperature: float = 0.0) -> Tensor:
     """Index of the nearest code: vectors [..., D], codebook [V, D] -> int64 [...]. Ties go to the lower index.
 
-    `cosine` takes the largest normalised dot product (A6), `euclidean` the smallest distance.
+    `cosine` takes the largest normalised dot product (A6), `euclidean` the smallest distance. A temperature above 0
+    draws instead, with Gumbel noise: code v has probability softmax(closeness / temperature), closeness being the
+    cosine or minus the squared distance (B1; for training).
     """
     if metric == "cosine":
         score = vectors @ F.normalize(codebook, dim=-1).T
+        unit = vectors.norm(dim=-1, keepdim=True)  # score / unit is the closeness
     elif metric == "euclidean":
         score = vectors @ codebook.T - 0.5 * codebook.square().sum(dim=-1)
+        unit = score.new_tensor(0.5)  # up to a constant of the vector
     else:
         raise ValueError(f"unknown metric {metric!r}; accepted: {', '.join(METRICS)}")
+    if temperature > 0:
+        gumbel = -torch.empty_like(score).exponential_().log()
+        score = score / unit.clamp(min=1e-12) / temperature + gumbel
     return score.argmax(dim=-1)
 
 
@@ -70,9 +79,9 @@ class Codebook(nn.Module):
         self.register_buffer("sums", torch.zeros(codes, width))
         self.register_buffer("counts", torch.zeros(codes))
 
-    def lookup(self, vectors: Tensor) -> Tensor:
-        """Nearest code of each vector [..., D] -> int64 [...]."""
-        return nearest_code(vectors, self.vectors, self.metric)
+    def lookup(self, vectors: Tensor, temperature: float = 0.0) -> Tensor:
+        """Nearest code of each vector [..., D] -> int64 [...]; with a temperature a noisy one (see nearest_code)."""
+        return nearest_code(vectors, self.vectors, self.metric, temperature)
 
     def fill(self, vectors: Tensor) -> Tensor:
         """Leading V rows of vectors [n, D]; rows tiled with noise of std 0.01 / sqrt(D) where n < V."""
@@ -137,19 +146,33 @@ class TrainingQuantized:
 
     embedding: Tensor  # [B, T, D], straight-through: value of the sum, gradient of z
     commitment: Tensor  # scalar
-    ids: tuple[Tensor, ...]  # pooled tokens, [B, s_n] a level
+    ids: tuple[Tensor, ...]  # pooled tokens, [B, s_n] a level used; a dropped level has none
 
 
 class MultiScaleQuantizer(nn.Module):
-    """Residual quantization over growing numbers of tokens, each scale with its own codebook and phi (A6)."""
+    """Residual quantization over growing numbers of tokens, each scale with its own codebook and phi (A6).
+
+    In training, codes are drawn with Gumbel noise of temperature `draw`, and a share `level_drop` of the steps uses a
+    random prefix of the levels only, from 1 to all (B1); both are 0 in LG-Tok.
+    """
 
     def __init__(
-        self, scales: Sequence[int], codes: Sequence[int], width: int, *, metric: str = "cosine", phi: str = "conv"
+        self,
+        scales: Sequence[int],
+        codes: Sequence[int],
+        width: int,
+        *,
+        metric: str = "cosine",
+        phi: str = "conv",
+        draw: float = 0.0,
+        level_drop: float = 0.0,
     ) -> None:
         super().__init__()
         if len(scales) != len(codes):
             raise ValueError(f"{len(scales)} scales need as many codebook sizes, got {len(codes)}")
         self.scales = tuple(scales)
+        self.draw = draw
+        self.level_drop = level_drop
         self.codebooks = module_list(Codebook(v, width, metric=metric) for v in codes)
         self.phis = module_list(Phi(width, phi) for _ in scales)
         self.started: Tensor
@@ -216,15 +239,24 @@ class MultiScaleQuantizer(nn.Module):
         residual, total = z.detach(), torch.zeros_like(z)
         ids = []
         commitment = z.new_zeros(())
-        for level, size in enumerate(self.scales):
+        noise = self.draw if self.training else 0.0
+        for level, size in enumerate(self.scales[: self._levels_used()]):
             book = self.codebooks[level]
-            ids.append(book.lookup(resample_down(residual, size)))
+            ids.append(book.lookup(resample_down(residual, size), noise))
             share = self.share(level, ids[-1])
             if self.training:
                 flat = residual.flatten(0, 1)
-                book.learn(flat, book.lookup(flat))
+                book.learn(flat, ids[-1].flatten() if size == self.length else book.lookup(flat, noise))
             total = total + share
             residual = residual - share.detach()
             commitment = commitment + F.mse_loss(total.detach(), z) + F.mse_loss(total, z.detach())
         straight = z + (total - z).detach()
-        return TrainingQuantized(straight, commitment / len(self.scales), tuple(ids))
+        return TrainingQuantized(straight, commitment / len(ids), tuple(ids))
+
+    def _levels_used(self) -> int:
+        """How many levels this training step uses: all, or the same random prefix on every process (B1)."""
+        levels = len(self.scales)
+        if not self.training or not self.level_drop:
+            return levels
+        coin, place = _from_first_process(torch.rand(2, device=self.started.device)).tolist()
+        return levels if coin >= self.level_drop else 1 + int(place * levels)

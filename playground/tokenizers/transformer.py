@@ -5,7 +5,7 @@ growing scales. decode: frame queries look at the de-quantized latents and at th
 without text and extrapolates.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -16,6 +16,7 @@ from playground.limits import LIMITS
 from playground.nn.attention import Memory
 from playground.nn.blocks import UStack
 from playground.nn.linear import Conv3, Linear
+from playground.nn.modules import WordTable
 from playground.nn.rope import Rotation, rope_angles
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Quantized, Tokens
@@ -51,7 +52,10 @@ class TokenizerConfig:
     code_width: int = 512
     metric: str = "cosine"  # code look-up: cosine | euclidean
     phi: str = "conv"  # conv | residual | identity
+    draw: float = 0.0  # Gumbel temperature of the look-ups in training; MoMask's quantizer has 0.5 (A11)
+    level_drop: float = 0.0  # share of training steps that use a prefix of the levels; 0.2 there
     text_width: int = 2048  # width of the text encoder's token states
+    text_table: int = 0  # above 0: the encoder gives word numbers below it, and their vectors are learned (Table 4f)
     text_positions: int = LIMITS.max_text_positions  # positions reserved for text in front of the latents
     text_side: TextSide = "both"  # Table 4e
     text_mixing: Mixing = "in-context"  # tokenizer, Table 4g
@@ -77,11 +81,20 @@ class TokenizerConfig:
         return self.scales[-1]
 
 
+def residual_levels(config: TokenizerConfig, levels: int = 6, codes: int = 512) -> TokenizerConfig:
+    """The same transformer with MoMask's plain residual quantizer: every level holds a token a latent (A11, B1)."""
+    return replace(
+        config, scales=(config.latents,) * levels, codes=(codes,) * levels, metric="euclidean", phi="identity",
+        draw=0.5, level_drop=0.2,
+    )  # fmt: skip
+
+
 PRESETS: dict[str, TokenizerConfig] = {
     "full": TokenizerConfig(),
     "mid": TokenizerConfig(scales=MID_SCALES),
     "mini": TokenizerConfig(scales=MINI_SCALES),
     "tiny": TokenizerConfig(depth=3),
+    "rvq": residual_levels(TokenizerConfig()),
     "lite": TokenizerConfig(
         patch=4, width=192, depth=5, heads=3, hidden=512, dropout=0.0, scales=MID_SCALES,
         codes=linear_codes(128, 384, 10), code_width=192, phi="residual", text_width=384, pre_norm=True,
@@ -100,8 +113,8 @@ class TrainingOutput:
 
 
 def length_mask(lengths: Tensor, size: int) -> Tensor | None:
-    """Boolean [B, size], True where real; None where every row is full."""
-    if bool((lengths >= size).all()):
+    """Boolean [B, size], True where real; None where every row is full (on a GPU, asking would wait for it)."""
+    if lengths.device.type == "cpu" and bool((lengths >= size).all()):
         return None
     return torch.arange(size, device=lengths.device)[None] < lengths[:, None]
 
@@ -120,7 +133,7 @@ class LGTok(nn.Module):
         crossed_in = (c.motion_mixing == "cross") + (self.text_in and c.text_mixing == "cross")
         crossed_out = (c.latent_mixing_out == "cross") + (self.text_out and c.text_mixing_out == "cross")
         self.motion_in = Linear(c.patch * c.columns, c.width)
-        self.text_proj = Linear(c.text_width, c.width)
+        self.text_proj = WordTable(c.text_table, c.width) if c.text_table else Linear(c.text_width, c.width)
         self.latent_tokens = nn.Parameter(torch.randn(c.latents, c.width) * c.width**-0.5)
         self.mask_vector = nn.Parameter(torch.randn(c.width) * c.width**-0.5)  # frame query and null text
         self.query_positions = nn.Parameter(torch.randn(self.frames, c.width) * c.width**-0.5)
@@ -129,7 +142,9 @@ class LGTok(nn.Module):
         self.to_code = Conv3(c.width, c.code_width)
         self.from_code = Conv3(c.code_width, c.width)
         self.motion_out = Linear(c.width, c.patch * c.columns)
-        self.quantizer = MultiScaleQuantizer(c.scales, c.codes, c.code_width, metric=c.metric, phi=c.phi)
+        self.quantizer = MultiScaleQuantizer(
+            c.scales, c.codes, c.code_width, metric=c.metric, phi=c.phi, draw=c.draw, level_drop=c.level_drop
+        )
         if c.positions == "learned":
             total = c.text_positions + c.latents + self.frames
             self.table_in = nn.Parameter(torch.randn(total, c.width) * c.width**-0.5)
@@ -232,13 +247,18 @@ class LGTok(nn.Module):
 
     # ---- detokenizer ----------------------------------------------------------------------------------------------
 
-    def _detokenize(self, embedding: Tensor, lengths: Tensor, text_memory: Memory | None) -> Tensor:
-        """embedding [B, T, code width] -> features [B, F, C], or [2B, F, C] where the memory asks for a null branch."""
+    def _detokenize(
+        self, embedding: Tensor, lengths: Tensor, text_memory: Memory | None, frames: int | None = None
+    ) -> Tensor:
+        """embedding [B, T, code width] -> features [B, F, C], or [2B, F, C] where the memory asks for a null branch.
+
+        F is `frames`, or else the longest length.
+        """
         c = self.config
-        batch, frames = len(lengths), int(lengths.max())
+        batch, frames = len(lengths), int(lengths.max()) if frames is None else frames
         latents = self.from_code(embedding)
         tokens = self._patched(lengths)
-        count = int(tokens.max())
+        count = -(-frames // c.patch)
         queries = (self.mask_vector + self.query_positions[:count]).to(latents.dtype).expand(batch, -1, -1)
         parts, masks, memories = [queries], [length_mask(tokens, count)], []
         places = [torch.arange(count, device=queries.device)]
@@ -321,7 +341,7 @@ class LGTok(nn.Module):
         z = self.latents(features, lengths, text, dropped)
         quantized = self.quantizer(z)
         memory = self._memory(len(lengths), text, dropped)
-        out = self._detokenize(quantized.embedding.to(z.dtype), lengths, memory)
+        out = self._detokenize(quantized.embedding.to(z.dtype), lengths, memory, features.shape[1])
         return TrainingOutput(out, quantized.commitment, quantized.ids)
 
 

@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import pytest
@@ -144,6 +145,71 @@ def test_first_training_batch_fills_every_codebook():
     z = torch.randn(2, 5, 4)
     quantizer(z)
     assert bool(quantizer.started) and all(bool((b.vectors.abs().sum(-1) > 0).all()) for b in quantizer.codebooks)
+
+
+# ---- the plain residual quantizer (A11, B1) -----------------------------------------------------------------------
+
+
+def plain(levels: int = 3, seed: int = 0, **options) -> MultiScaleQuantizer:
+    torch.manual_seed(seed)
+    quantizer = MultiScaleQuantizer((5,) * levels, (6,) * levels, 4, metric="euclidean", phi="identity", **options)
+    for book in quantizer.codebooks:
+        book.vectors.normal_()
+    quantizer.started.fill_(True)
+    return quantizer
+
+
+def test_equal_scales_without_phi_are_a_plain_residual_quantizer():
+    quantizer, z = plain(draw=0.5, level_drop=0.2).eval(), torch.randn(2, 5, 4)
+    quantized = quantizer.encode(z)
+    for b, t in itertools.product(range(2), range(5)):
+        residual = z[b, t].double()
+        for level, book in enumerate(quantizer.codebooks):
+            chosen = slow_nearest(residual, book.vectors, "euclidean")
+            assert int(quantized.tokens.ids[level][b, t]) == chosen
+            residual = residual - book.vectors[chosen].double()
+        torch.testing.assert_close(z[b, t] - quantized.embedding[b, t], residual.float(), atol=1e-5, rtol=1e-5)
+
+
+def test_plain_commitment_pulls_z_as_momasks_does():
+    """B1: mean over layers of MSE(residual, stop(code)); our sum adds a term without gradient."""
+    quantizer, z = plain().eval(), torch.randn(2, 5, 4, requires_grad=True)
+    quantizer(z).commitment.backward()
+    ours = z.grad.clone()
+    leaf = z.detach().clone().requires_grad_()
+    residual, losses = leaf, []
+    for level, ids in enumerate(quantizer.encode(leaf.detach()).tokens.ids):
+        codes = quantizer.codebooks[level].vectors[ids]
+        losses.append(F.mse_loss(residual, codes))
+        residual = residual - codes
+    torch.stack(losses).mean().backward()
+    torch.testing.assert_close(ours, leaf.grad)
+
+
+@pytest.mark.parametrize("metric", ["cosine", "euclidean"])
+def test_noisy_lookup_draws_from_the_softmax_of_closeness(metric):
+    torch.manual_seed(3)
+    book, vector = torch.randn(4, 3), torch.randn(3)
+    close = book @ vector / book.norm(dim=1) / vector.norm()
+    close = close if metric == "cosine" else -(book - vector).square().sum(dim=1)
+    drawn = nearest_code(vector.expand(20_000, 3), book, metric, temperature=0.5)
+    shares = torch.bincount(drawn, minlength=4) / len(drawn)
+    torch.testing.assert_close(shares, (close / 0.5).softmax(dim=0), atol=0.015, rtol=0.0)
+    assert nearest_code(vector, book, metric, temperature=1e-6) == nearest_code(vector, book, metric)
+
+
+def test_dropped_levels_are_a_prefix_and_every_length_occurs():
+    quantizer = plain(levels=4, level_drop=1.0).train()
+    z, seen = torch.randn(2, 5, 4), set()
+    for _ in range(60):
+        before = [book.counts.clone() for book in quantizer.codebooks]
+        out = quantizer(z)
+        seen.add(len(out.ids))
+        moved = [not torch.equal(a, b.counts) for a, b in zip(before, quantizer.codebooks, strict=True)]
+        assert moved == [level < len(out.ids) for level in range(4)]
+    assert seen == {1, 2, 3, 4}
+    assert len(quantizer.eval()(z).ids) == 4
+    assert all(len(plain(levels=4, level_drop=0.0).train()(z).ids) == 4 for _ in range(20))
 
 
 def test_tokens_compare_print_and_survive_json():

@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import pytest
 import torch
@@ -153,10 +154,28 @@ def test_training_pass_reaches_every_parameter():
     assert [tuple(ids.shape) for ids in out.ids] == [(2, 1), (2, 3), (2, 6)]
 
 
+def test_a_learned_word_table_reads_numbers():
+    model, x = tiny_tokenizer(text_table=9, text_width=1), motion()
+    numbers = torch.tensor([[3.0, 7.0, 3.0, 0.0], [7.0, 0.0, 0.0, 0.0]])[..., None]
+    mask = torch.tensor([[True] * 4, [True, False, False, False]])
+    text = TextFeatures(numbers, mask, numbers.mean(dim=1), [["a"] * 4, ["b"]])
+    states = model.text_proj(numbers)
+    assert torch.equal(states[0, 0], states[0, 2]) and torch.equal(states[0, 1], states[1, 0])
+    assert not torch.equal(states[0, 0], states[0, 1])
+    other = TextFeatures(numbers + 1, mask, text.pooled, text.words)
+    assert not torch.equal(model.latents(x, LENGTHS, text), model.latents(x, LENGTHS, other))
+    trained = build_tokenizer(replace(TINY, text_table=9, text_width=1)).train()
+    trained(x, LENGTHS, text).features.square().sum().backward()
+    touched = trained.text_proj.vectors.weight.grad.abs().sum(dim=1) > 0
+    assert touched.nonzero()[:, 0].tolist() == [0, 3, 7]
+
+
 def test_presets_hold_the_published_numbers():
     assert linear_codes(256, 768, 10) == (256, 313, 370, 427, 484, 540, 597, 654, 711, 768)
     sums = {name: sum(PRESETS[name].scales) for name in ("full", "mid", "mini")}
     assert sums == {"full": 236, "mid": 160, "mini": 104}
+    rvq = PRESETS["rvq"]
+    assert (rvq.scales, rvq.codes, rvq.draw, rvq.level_drop, rvq.phi) == ((49,) * 6, (512,) * 6, 0.5, 0.2, "identity")
     assert PRESETS["tiny"].depth == 3 and PRESETS["full"].depth == 9
 
 
