@@ -43,10 +43,10 @@ class Card:
     hash: str = ""  # sha256 of the file, filled by loading
 
 
-def save_checkpoint(path: Path, model: nn.Module, card: Card) -> None:
-    """Write weights in float16 and the card, whole or not at all."""
+def save_checkpoint(path: Path, model: nn.Module, card: Card, dtype: torch.dtype = torch.float16) -> None:
+    """Write weights in `dtype` and the card, whole or not at all."""
     tensors: dict[str, Tensor] = {
-        f"model.{name}": value.detach().cpu().half().contiguous()
+        f"model.{name}": value.detach().cpu().to(dtype).contiguous()
         for name, value in model.state_dict().items()
         if name.rsplit(".", 1)[-1] not in TRAINING_ONLY
     }
@@ -120,7 +120,7 @@ def _read(
             names = [name for name in file.keys() if weights or name.startswith("normaliser.")]  # noqa: SIM118
             tensors = {name: file.get_tensor(name) for name in names}
         if kind is not None and metadata["kind"] != kind:
-            raise PlaygroundError(f"{path} is a {metadata['kind']} checkpoint, a {kind} is needed here")
+            raise PlaygroundError(f"{path} is no {kind} checkpoint but one of kind {metadata['kind']}")
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         card = _card(metadata, tensors, digest, configs[metadata["kind"]])
     except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:

@@ -121,8 +121,10 @@ def evaluator_path(name: str, assets: Path = ASSETS) -> Path:
 def open_evaluator(path: Path, name: str) -> tuple[Evaluator, Card]:
     """The evaluator in a file, with its card. PlaygroundError if the file is none, or of another kind than `name`."""
     network, card = load_model(path, "evaluator", EvaluatorConfig, build_evaluator)
-    if card.config.kind != name or card.normaliser is None:
+    if card.config.kind != name:
         raise PlaygroundError(f"{path} holds a {card.config.kind} evaluator, a {name} one is needed here")
+    if card.normaliser is None:
+        raise PlaygroundError(f"{path} lacks the mean and std of the features that the evaluator reads")
     encoder = load_encoder(card.encoder.name)
     check_same(card.encoder, encoder)
     return Evaluator(name, network, card.normaliser, encoder.encode, card.hash, card.facts), card

@@ -17,8 +17,9 @@ from dataclasses import replace
 from pathlib import Path
 from playground.data.batches import BatchConfig
 from playground.training import configs, run
-from playground.training.configs import GeneratorTraining, Schedule, TokenizerTraining
+from playground.training.configs import EvaluatorTraining, GeneratorTraining, Schedule, TokenizerTraining
 from playground.training.loop import Launch
+from tests.evaluation.tiny import TINY_EVALUATOR
 from tests.tiny import TINY, TINY_GENERATOR
 
 library, out = Path(sys.argv[1]), Path(sys.argv[2])
@@ -32,7 +33,11 @@ configs.TOKENIZERS["tiny-tokenizer"] = TokenizerTraining(
 configs.GENERATORS["tiny-generator"] = GeneratorTraining(
     TINY_GENERATOR, "tiny-tokenizer", batch, plan, size=4, variants=2, synthetic=0.0
 )
-for name in ("tiny-tokenizer", "tiny-generator"):
+names = ["tiny-tokenizer", "tiny-generator"]
+for kind in ("tmr", "clip"):
+    configs.EVALUATORS[f"tiny-{kind}"] = EvaluatorTraining(replace(TINY_EVALUATOR, kind=kind), batch, plan)
+    names.append(f"tiny-{kind}")
+for name in names:
     run.train(name, library, out, launch=Launch(accelerator="cpu", precision="32-true"))
 """
 
@@ -46,7 +51,8 @@ def weights(path: Path) -> dict:
 
 @pytest.fixture
 def library(tmp_path) -> Path:
-    clips = [LibraryClip(f"c{n}", "A", "train", "walk", ("walks left",), drifting(40 + 5 * n, n)) for n in range(6)]
+    words = ("walks left", "runs", "walks on", "hops", "walks right", "turns")
+    clips = [LibraryClip(f"c{n}", "A", "train", "walk", (words[n],), drifting(40 + 5 * n, n)) for n in range(6)]
     write_library(tmp_path / "library", clips, "tiny library")
     return tmp_path / "library"
 
@@ -61,7 +67,7 @@ def test_two_processes_equal_one_with_the_doubled_batch(library, tmp_path):
     for command in (plain, [*launcher, str(script), str(library), str(tmp_path / "two")]):
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[-6000:]
-    for part in ("tokenizer", "generator"):
+    for part in ("tokenizer", "generator", "tmr", "clip"):
         first, second = (weights(tmp_path / run / part / "state.safetensors") for run in ("one", "two"))
         assert first.keys() == second.keys()
         for name, value in first.items():

@@ -89,7 +89,7 @@ def test_checkpoints_describe_themselves_and_load(library, tmp_path, runs):
     assert not model.training and not any(p.requires_grad for p in model.parameters())
     network, generator_card = load_generator(tmp_path / "out" / "generator" / "checkpoint.safetensors")
     assert generator_card.facts["tokenizer"] == card.hash[:12] and network.config.scales == TINY.scales
-    with pytest.raises(PlaygroundError, match="is a tokenizer checkpoint"):
+    with pytest.raises(PlaygroundError, match="is no generator checkpoint but one of kind tokenizer"):
         load_generator(path)
 
 
