@@ -4,7 +4,7 @@ Every scale is drawn at once, given all coarser scales: the running sum of the d
 next scale's length, is the input of that scale. The loop over scales is written once (`ScalewiseGenerator.steps`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import torch
@@ -25,8 +25,6 @@ from playground.tokenizers.base import Tokens
 from playground.tokenizers.quantizers import MultiScaleQuantizer, resample_down
 from playground.tokenizers.transformer import FULL_SCALES, MID_SCALES, linear_codes
 
-ROPE_SPAN = 64.0  # every scale's positions run from 0 to this
-
 
 @dataclass(frozen=True)
 class GeneratorConfig:
@@ -38,6 +36,7 @@ class GeneratorConfig:
     hidden: int = 768
     dropout: float = 0.2
     rope_base: float = 100.0
+    rope_span: float = 64.0  # every scale's positions run from 0 to this
     text_width: int = 512
     text_mask: bool = False  # False: all positions of the encoder are seen, padding too (as released, with CLIP)
     length_unit: int = 4  # frames a row of the length table
@@ -108,7 +107,7 @@ class ScalewiseTransformer(nn.Module):
     def positions(self, level: int) -> Tensor:
         """Continuous positions [s_n] of a scale on the common axis 0..64; a single token stands at 0."""
         return (
-            torch.linspace(0.0, ROPE_SPAN, self.config.scales[level])
+            torch.linspace(0.0, self.config.rope_span, self.config.scales[level])
             if self.config.scales[level] > 1
             else torch.zeros(1)
         )
@@ -178,25 +177,27 @@ class ScalewiseTransformer(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class Edit:
-    """What a generation keeps: source tokens at latents where keep (bool [T]) is True, and all of the first scales."""
+    """What a generation keeps: the source's tokens [1 or B, s_n] wherever redraw (bool [s_n] a level) is False."""
 
     tokens: Tokens
-    keep: Tensor
-    forced: int = 0  # so many coarse scales are taken from the source whole
+    redraw: tuple[Tensor, ...]
 
     def mix(self, level: int, drawn: Tensor) -> Tensor:
-        """Drawn ids [B, s_n] with the kept positions put back; the mask is resized linearly, threshold 0.5 (A10)."""
-        source = self.tokens.ids[level]
-        if level < self.forced:
-            return source
-        redraw = (~self.keep).float()[None, None]
-        size = drawn.shape[1]
-        redraw = (
-            F.interpolate(redraw, size, mode="linear", align_corners=False)[0, 0]
-            if len(self.keep) != size
-            else redraw[0, 0]
-        )
-        return torch.where(redraw > 0.5, drawn, source)
+        """Drawn ids [B, s_n] with the kept positions put back."""
+        return torch.where(self.redraw[level], drawn, self.tokens.ids[level])
+
+
+def redraw_masks(keep: Tensor, sizes: Sequence[int], forced: int = 0) -> tuple[Tensor, ...]:
+    """Latents to keep (bool [T]) -> tokens to draw anew, bool [s_n] a level.
+
+    The mask is resized linearly, threshold 0.5 (A10); of the first `forced` scales nothing is drawn anew.
+    """
+    redraw = (~keep).float()[None, None]
+    masks = []
+    for level, size in enumerate(sizes):
+        here = redraw if len(keep) == size else F.interpolate(redraw, size, mode="linear", align_corners=False)
+        masks.append((here[0, 0] > 0.5) & (level >= forced))
+    return tuple(masks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,8 +251,12 @@ class ScalewiseGenerator:
         sampling: Sampling,
         forced: int = 0,
     ) -> Tokens:
-        """Redraw the tokens where keep (bool [T]) is False; kept positions hold their codes at every scale (A10)."""
-        *_, last = self.steps(text, lengths, sampling, Edit(tokens, keep, forced))
+        """Redraw the tokens where keep (bool [T]) is False; kept positions hold their codes at every scale (A10).
+
+        forced: so many coarse scales are taken from the source whole.
+        """
+        redraw = redraw_masks(keep, self.quantizer.scales, forced)
+        *_, last = self.steps(text, lengths, sampling, Edit(tokens, redraw))
         return last.tokens
 
     @torch.no_grad()

@@ -46,6 +46,7 @@ class Memory:
     null: Tensor | None = None
     null_rows: int = 0
     rotations: tuple[Rotation, Rotation] | None = None  # rotary positions of the queries and of the states, if any
+    record: list[Tensor] | None = None  # where given, every layer appends its attention weights [B, H, T, S]
 
 
 def split_heads(x: Tensor, heads: int) -> Tensor:
@@ -59,6 +60,14 @@ def attend(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, dropo
         mask = mask[:, None, None, :]
     out = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=dropout)
     return out.transpose(1, 2).flatten(-2)
+
+
+def attention_weights(query: Tensor, key: Tensor, mask: Tensor | None) -> Tensor:
+    """What `attend` multiplies the values with: [B, H, T, head width] twice, key mask [B, S] -> [B, H, T, S]."""
+    score = query @ key.transpose(-2, -1) / query.shape[-1] ** 0.5
+    if mask is not None:
+        score = score.masked_fill(~mask[:, None, None, :], float("-inf"))
+    return score.softmax(dim=-1)
 
 
 class SelfAttention(nn.Module):
@@ -134,6 +143,10 @@ class CrossAttention(nn.Module):
             mask = None if mask is None else torch.cat([mask] * 2)
             if turn_query is not None:
                 turn_query = (torch.cat([turn_query[0]] * 2), torch.cat([turn_query[1]] * 2))
+        if memory.record is not None:
+            query = split_heads(self.query(x[:live]), self.heads)
+            query = query if turn_query is None else apply_rope(query, turn_query)
+            memory.record.append(attention_weights(query, keys_values[0], mask))
         out = self.attend(x[:live], keys_values, mask, turn_query)
         if memory.null_rows and memory.null is not None:
             constant = self.constant(memory.null).expand(memory.null_rows, x.shape[1], -1)

@@ -18,6 +18,7 @@ from playground.nn.blocks import UStack
 from playground.nn.linear import Conv3, Linear
 from playground.nn.modules import WordTable
 from playground.nn.rope import Rotation, rope_angles
+from playground.nn.sequences import join_masks, put_before
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Quantized, Tokens
 from playground.tokenizers.quantizers import MultiScaleQuantizer
@@ -230,7 +231,7 @@ class LGTok(nn.Module):
         sequence = torch.cat(parts, dim=1)
         if c.positions == "learned":
             sequence = sequence + self.table_in[positions]
-        out = self.encoder(sequence, self._rotation(positions), _join_masks(masks, parts), memories)
+        out = self.encoder(sequence, self._rotation(positions), join_masks(masks, parts), memories)
         first = parts[0].shape[1] if starts[0] == 0 else 0
         kept = out[:, first : first + c.latents]
         return self.to_code(kept)  # (B, T, code width)
@@ -265,14 +266,14 @@ class LGTok(nn.Module):
         if c.latent_mixing_out == "cross":
             memories.append(Memory(latents, rotations=self._cross_rotations(places[0], lengths)))
         else:
-            _put_before(parts, masks, places, latents, None, c.latents)
+            put_before(parts, masks, places, latents, None, c.latents)
         if text_memory is not None and c.text_mixing_out == "cross":
             memories.append(text_memory)
         elif text_memory is not None:
-            _put_before(parts, masks, places, text_memory.states, text_memory.mask, c.text_positions)
+            put_before(parts, masks, places, text_memory.states, text_memory.mask, c.text_positions)
         sequence = torch.cat(parts, dim=1)
         positions = torch.cat(places)
-        out = self.decoder(sequence, self._rotation(positions), _join_masks(masks, parts), memories)
+        out = self.decoder(sequence, self._rotation(positions), join_masks(masks, parts), memories)
         motion = self.motion_out(out[:, -count:])  # (B or 2B, F / patch, patch * C)
         motion = motion.reshape(len(out), count * c.patch, c.columns)[:, :frames]
         real = length_mask(lengths, frames)
@@ -326,6 +327,19 @@ class LGTok(nn.Module):
         conditional = branch(text)
         return conditional if not guidance else (1 + guidance) * conditional - guidance * branch(None)
 
+    @torch.no_grad()
+    def text_attention(self, embedding: Tensor, lengths: Tensor, text: TextFeatures) -> Tensor:
+        """Cross-attention of frame queries to words while decoding: [layers, B, H, F / patch, W], rows sum to 1 (A4).
+
+        ValueError where the detokenizer has no cross-attention to text (Table 4e, 4g).
+        """
+        memory = self._memory(len(lengths), text, None)
+        if memory is None or self.config.text_mixing_out != "cross":
+            raise ValueError("this detokenizer has no cross-attention to text")
+        record: list[Tensor] = []
+        self._detokenize(embedding, lengths, replace(memory, record=record))
+        return torch.stack(record)
+
     def _gate(self, edit_mask: Tensor, lengths: Tensor) -> Tensor:
         short = int(self._patched(lengths).max()) * self.config.patch - edit_mask.shape[1]
         padded = F.pad(edit_mask.bool(), (0, max(short, 0)))[:, : edit_mask.shape[1] + short]
@@ -358,26 +372,6 @@ def _build_stack(c: TokenizerConfig, memories: int) -> UStack:
         feed=c.feed,
         skips=c.skips,
     )
-
-
-def _put_before(
-    parts: list[Tensor], masks: list[Tensor | None], places: list[Tensor], part: Tensor, mask: Tensor | None, room: int
-) -> None:
-    """Prepend a part to a sequence; it takes `room` positions, however long it is."""
-    places[:] = [torch.arange(part.shape[1], device=part.device), *(place + room for place in places)]
-    parts.insert(0, part)
-    masks.insert(0, mask)
-
-
-def _join_masks(masks: list[Tensor | None], parts: list[Tensor]) -> Tensor | None:
-    """Key masks of concatenated parts -> [B, S], or None where every part is full."""
-    if all(mask is None for mask in masks):
-        return None
-    filled = [
-        mask if mask is not None else torch.ones(part.shape[:2], dtype=torch.bool, device=part.device)
-        for mask, part in zip(masks, parts, strict=True)
-    ]
-    return torch.cat(filled, dim=1)
 
 
 def _init(module: nn.Module) -> None:
