@@ -179,7 +179,16 @@ def _for_data(command: Command) -> None:
     sub.add_argument("system", metavar="SYSTEM")
     sub.add_argument("--library", type=Path, required=True, metavar="DIR")
     sub.add_argument("--split", choices=SPLITS, default="test")
-    sub.add_argument("--json", dest="to", type=_output(), metavar="OUT", help="file to write (default: stdout)")
+    sub.add_argument("--repeats", type=int, default=0, help="measure everything so often; 0: reconstruction alone")
+    sub.add_argument("--mm-texts", type=int, default=96, help="texts of MultiModality (default 96)")
+    sub.add_argument("--mm-samples", type=int, default=30, help="motions a text of MultiModality (default 30)")
+    sub.add_argument("--seed", type=int, default=0)
+    sub.add_argument("--guidance", type=_number, help="guidance scale g of the decoder (default: the system's own)")
+    sub.add_argument("--cfg", type=_number, help="guidance scale of the generator (default: the system's own)")
+    sub.add_argument(
+        "--json", dest="to", type=_output(), metavar="OUT",
+        help="file to write (default: stdout); the same call goes on with its finished repeats",
+    )  # fmt: skip
 
     sub = command("bench", commands.bench, "measure speed and memory")
     sub.add_argument("--json", dest="to", type=_output(), metavar="OUT", help="also write the figures to a file")

@@ -4,6 +4,7 @@ import json
 import os
 import socket
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -138,15 +139,21 @@ def train(
     train(config, library, out, resume=resume, steps=steps, launch=launch)
 
 
-def evaluate(system: str, library: Path, split: str, to: Path | None) -> None:
-    """Measure a system on a split."""
+def evaluate(system: str, library: Path, split: str, to: Path | None, **asked: Any) -> None:
+    """Measure a system on a split; `asked` is the rest of evaluation.run.Order."""
     _check_system(default_engine(), system)
     if not Library.open(library).split(split):
         raise PlaygroundError(f"the split {split} of {library} is empty")
     from playground.evaluation import run
+    from playground.evaluation.spread import join_spread
 
-    with Progress(f"evaluating {system}") as progress:
-        result = run.evaluate(system, library, split, progress)
+    order = run.Order(**asked, out=to)
+    order.check()
+    spread = join_spread()
+    with Progress(f"evaluating {system}") if spread.first else nullcontext() as progress:
+        result = run.evaluate(system, library, split, progress, order=order, spread=spread)
+    if not spread.first:
+        return
     _write_text(_json(result) + "\n", to)
     if to:
         say(f"{to}: " + ", ".join(f"{key} {value:.1f}" for key, value in result.items() if isinstance(value, float)))

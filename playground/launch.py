@@ -3,9 +3,10 @@
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from lightning.fabric import Fabric
+if TYPE_CHECKING:
+    from lightning.fabric import Fabric
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,10 @@ def launched() -> bool:
     return "LOCAL_WORLD_SIZE" in os.environ
 
 
-def launch_fabric(launch: Launch, loggers: Sequence[Any] = ()) -> Fabric:
-    """A launched Fabric."""
+def launch_fabric(launch: Launch, loggers: Sequence[Any] = ()) -> "Fabric":
+    """A launched Fabric; the package lightning is imported here."""
+    from lightning.fabric import Fabric
+
     precision = "bf16-mixed" if launch.precision == "auto" else launch.precision
     devices, nodes = launch.devices, launch.nodes
     if launched():  # torchrun has decided already

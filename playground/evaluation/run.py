@@ -1,47 +1,173 @@
-"""Measure a system on a split of a library: reconstruction error and code usage (systems.md F2)."""
+"""Measure a system on a split of a library: reconstruction error and code usage, and all metrics of F2 over repeats."""
 
 import math
 from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from playground.analysis.passes import ClipPass, clip_passes, first_caption
 from playground.analysis.usage import CodeUsage
 from playground.data.library import Library
-from playground.engine import Engine, default_engine
+from playground.engine import Engine, check_guidance, default_engine
 from playground.errors import PlaygroundError
+from playground.evaluation.items import measurable
+from playground.evaluation.passes import Passes
+from playground.evaluation.repeats import CLIP, MAIN, Plan, Repeat, summarise
+from playground.evaluation.spread import Spread, Tally
+from playground.evaluation.state import State, digest, state_path
+from playground.limits import LIMITS
+from playground.systems import SamplingDefaults, checkpoint_path, row_of
+
+if TYPE_CHECKING:
+    from playground.evaluation.evaluators import Evaluator
+    from playground.runtime import Runtime
+
+Progress = Callable[[int, int], None]
+TEXTS_KEPT = 20_000  # captions whose features are kept during an evaluation
+TABLES = ("metrics", "real", "reconstruction")
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is asked beyond reconstruction; nothing with repeats = 0.
+
+    guidance, cfg: of the decoder and of the generator, the system's own by default. out: the file of the result, beside
+    which the state is kept. evaluators: the shipped ones by default.
+    """
+
+    repeats: int = 0
+    mm_texts: int = 96
+    mm_samples: int = 30
+    seed: int = 0
+    guidance: float | None = None
+    cfg: float | None = None
+    out: Path | None = None
+    evaluators: dict[str, "Evaluator"] | None = None
+
+    def check(self) -> None:
+        """PlaygroundError for a number out of range."""
+        for name, value in (("repeats", self.repeats), ("mm-texts", self.mm_texts), ("mm-samples", self.mm_samples)):
+            if not 0 <= value <= 1000:
+                raise PlaygroundError(f"--{name} is {value}; 0 to 1000 is accepted")
+        if not 0 <= self.seed <= LIMITS.max_seed:
+            raise PlaygroundError(f"the seed must be a whole number from 0 to {LIMITS.max_seed}")
+        check_guidance(self.guidance or 0.0)
+        check_guidance(self.cfg or 0.0, "cfg")
+
+    def sampling(self, system: str) -> SamplingDefaults:
+        """How motions are generated: the system's own settings but for those asked for."""
+        asked = {"guidance": self.guidance, "cfg": self.cfg}
+        return replace(row_of(system).sampling, **{key: value for key, value in asked.items() if value is not None})
 
 
 def evaluate(
     system: str,
     library_path: Path,
     split: str = "test",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     *,
     engine: Engine | None = None,
     seed: int = 0,
+    order: Order | None = None,
+    spread: Spread | None = None,
 ) -> dict[str, Any]:
-    """Reconstruction and code usage of a system, true first caption at both ends, g = 0.
+    """Reconstruction and code usage of a system, true first caption at both ends, g = 0; and the metrics of the order.
 
     Clips are floored to 4 rows and measured on their first 196; too short ones are left out, n counts the others.
     Errors are pelvis-relative millimetres pooled over frames (F2); the mean over sources weighs every source alike.
-    Nothing here is drawn at random; seed is only written down. Numbers that do not exist (no token) are None.
-    PlaygroundError if the system has no checkpoint, the library is none, or the split holds no clip to measure.
+    Numbers that do not exist (no token) are None. An order of at least one repeat adds "repeats", "sampling",
+    "evaluators" and the tables "metrics" (of generated motions and of tokens), "real" and "reconstruction", each
+    {metric: {"mean", "ci95", "n"}}; there windows, captions and motions are drawn, from (seed, repeat) alone. With a
+    `spread` the processes share the work, and the first one returns the result, the others {}.
+    PlaygroundError if the system has no checkpoint, the library is none, the split holds no clip to measure, or the
+    state beside order.out is another evaluation's.
     """
+    order, spread, engine = order or Order(seed=seed), spread or Spread(), engine or default_engine()
+    order.check()
     library = Library.open(Path(library_path))
     chosen = library.split(split)
-    runtime = (engine or default_engine()).runtime(system)
+    runtime = engine.runtime(system)
+    if not order.repeats:
+        return reconstruct(runtime, library, split, order.seed, progress) if spread.first else {}
+    clips = measurable(library, chosen)
+    evaluators = shipped_evaluators() if order.evaluators is None else order.evaluators
+    sampling = order.sampling(system)
+    settings = {
+        "system": system,
+        "checkpoint": runtime.checkpoint,
+        "generator": digest(checkpoint_path(engine.assets, system, "generator")),
+        "data": library.name,
+        "clips": digest(library.path / "clips.jsonl"),
+        "split": split,
+        "seed": order.seed,
+        "mm_texts": order.mm_texts,
+        "mm_samples": order.mm_samples,
+        "sampling": asdict(sampling),
+        "evaluators": {name: one.hash[:12] for name, one in evaluators.items()},
+    }
+    state = State(state_path(order.out) if order.out and spread.first else None, settings)
+    base = reconstruct(runtime, library, split, order.seed) if spread.first else {}
+    passes = make_passes(runtime, library, evaluators, sampling, spread)
+    _repeat(passes, clips, order, state, progress)
+    if not spread.first:
+        return {}
+    tables = {name: summarise([repeat[name] for repeat in state.repeats[: order.repeats]]) for name in TABLES}
+    shown = ("generator", "sampling", "evaluators", "mm_texts", "mm_samples")
+    return base | {"repeats": order.repeats} | {key: settings[key] for key in shown} | tables
+
+
+def make_passes(
+    runtime: "Runtime",
+    library: Library,
+    evaluators: dict[str, "Evaluator"],
+    sampling: SamplingDefaults,
+    spread: Spread,
+) -> Passes:
+    """The passes of a system on this process's device, which remember the features of every caption."""
+    from playground.text.encoders import CachedEncoder
+
+    local = replace(runtime.to(spread.device), encoder=CachedEncoder(runtime.encoder, capacity=TEXTS_KEPT))
+    drawing = asdict(sampling)
+    guidance = drawing.pop("guidance")
+    return Passes(local, library, evaluators, guidance, drawing, spread)
+
+
+def shipped_evaluators() -> dict[str, "Evaluator"]:
+    """The evaluators that have a checkpoint here, by name."""
+    from playground.evaluation.evaluators import evaluator_path, load_evaluator
+
+    return {name: load_evaluator(name) for name in (MAIN, CLIP) if evaluator_path(name).is_file()}
+
+
+def _repeat(passes: Passes, clips: list[int], order: Order, state: State, progress: Progress | None) -> None:
+    """Run the repeats that are not in the state yet."""
+    plan = Plan(order.seed, order.mm_texts, order.mm_samples)
+    done = passes.spread.tell(len(state.repeats))
+    motions = plan.motions(len(clips), passes.runtime.generator is not None)
+    passes.tally = Tally(progress, (order.repeats - done) * motions // passes.spread.size)
+    for number in range(done, order.repeats):
+        tables = Repeat(passes, clips, plan, number).run()
+        if passes.spread.first:
+            state.add(tables)
+
+
+def reconstruct(
+    runtime: "Runtime", library: Library, split: str, seed: int, progress: Progress | None = None
+) -> dict[str, Any]:
+    """The quick part: reconstruction and code usage, first captions. Nothing is drawn; seed is only written down."""
+    chosen = library.split(split)
     captions = [first_caption(library.clips[i].captions) for i in chosen]
     passes = list(clip_passes(runtime, library, chosen, captions, progress=progress))
     if not passes:
-        raise PlaygroundError(f"the split {split} of {library_path} holds no clip long enough to be measured")
+        raise PlaygroundError(f"the split {split} of {library.path} holds no clip long enough to be measured")
     by_source = errors_by_source(passes, [library.clips[one.index].source for one in passes])
     config = runtime.tokenizer.config
     usage = CodeUsage().fit([np.stack(level) for level in zip(*(one.ids for one in passes), strict=True)], config.codes)
     return {
-        "system": system,
+        "system": runtime.name,
         "checkpoint": runtime.checkpoint,
         "data": library.name,
         "split": split,

@@ -1,0 +1,216 @@
+"""The passes of an evaluation: recorded, rebuilt and generated motions through the evaluators and the measures.
+
+Every pass runs over the batches of its items (items.portions), those of this process alone, and returns arrays over all
+items, the same on every process (spread.py).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from playground.data.library import Library
+from playground.evaluation.items import Item, portions
+from playground.evaluation.judges import judge_motion
+from playground.evaluation.prompts_obeyed import Prompt
+from playground.evaluation.spread import Spread, Tally
+from playground.motion.measures import bone_drift, foot_sliding, joint_errors
+from playground.motion.representation import from_features67
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from playground.evaluation.evaluators import Evaluator
+    from playground.runtime import Runtime
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Measured on n motions. embeddings: evaluator -> [n, D]; sliding [n] mm/s, nan without contact; drift [n] mm."""
+
+    embeddings: dict[str, Floats]
+    sliding: Floats
+    drift: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Rebuilt:
+    """n motions tokenized and decoded, their caption at both ends.
+
+    errors_mm: [n] mean of a motion; ids, predictions: a scale int64 [n, s_n]; likelihood: a scale [n], mean ln p of the
+    true tokens. The last two are empty without a generator.
+    """
+
+    motions: Motions
+    errors_mm: Floats
+    ids: list[NDArray[np.int64]]
+    likelihood: list[Floats]
+    predictions: list[NDArray[np.int64]]
+
+
+class Passes:
+    """One system, one library, the evaluators that are there, and the processes that share the work."""
+
+    def __init__(
+        self,
+        runtime: "Runtime",
+        library: Library,
+        evaluators: dict[str, "Evaluator"],
+        guidance: float,
+        sampling: dict[str, Any],
+        spread: Spread,
+    ) -> None:
+        self.runtime = runtime
+        self.library = library
+        self.evaluators = evaluators
+        self.guidance = guidance  # of the detokenizer, for generated motions; rebuilt ones are decoded with 0
+        self.sampling = sampling  # of the generator: cfg, temperature, top_k, top_p
+        self.spread = spread
+        self.tally = Tally(None, 0)
+
+    # ---- passes ---------------------------------------------------------------------------------------------------
+
+    def texts(self, items: Sequence[Item]) -> dict[str, Floats]:
+        """Embeddings [n, D] of the captions by every evaluator; zeros where a caption is empty."""
+        out = self._embeddings(len(items))
+        for part in self._mine(items):
+            if items[part[0]].caption:
+                for name, evaluator in self.evaluators.items():
+                    out[name][part] = evaluator.embed_texts([items[place].caption for place in part])
+        return self._shared(out)
+
+    def recorded(self, items: Sequence[Item]) -> Motions:
+        """The recorded motions themselves."""
+        return self._measured(items, self._recorded)
+
+    def generated(self, items: Sequence[Item]) -> Motions:
+        """Motions made from the captions, as long as the recorded ones."""
+        return self._measured(items, self._generate)
+
+    def samples(self, items: Sequence[Item], name: str) -> Floats:
+        """Embeddings [n, D] by one evaluator of motions made from the captions."""
+        out = np.zeros((len(items), self.evaluators[name].width))
+        for part in self._mine(items):
+            out[part] = self.evaluators[name].embed_rows(self._generate([items[place] for place in part]))
+            self.tally.add(len(part))
+        return self.spread.total(out)
+
+    def obeyed(self, prompts: Sequence[Prompt], items: Sequence[Item]) -> Floats:
+        """1 for every prompt that its generated motion obeys, else 0; [n]."""
+        out = np.zeros(len(items))
+        for part in self._mine(items):
+            made = self._generate([items[place] for place in part])
+            for place, rows in zip(part, made, strict=True):
+                out[place] = not judge_motion(prompts[place].judge, from_features67(rows))
+            self.tally.add(len(part))
+        return self.spread.total(out)
+
+    def rebuilt(self, items: Sequence[Item]) -> Rebuilt:
+        """Recorded motions tokenized and decoded again; with a generator, how it would have predicted their tokens."""
+        scales = self.runtime.tokenizer.quantizer.scales
+        motions, errors = _Filling(len(items), self._embeddings(len(items))), np.zeros(len(items))
+        ids, predictions = np.zeros((2, len(items), sum(scales)))
+        likelihood = np.zeros((len(items), len(scales)))
+        for part in self._mine(items):
+            batch = [items[place] for place in part]
+            given = self._recorded(batch)
+            tokens, made = self._rebuild(batch, given)
+            motions.fill(part, made, self.evaluators)
+            for place, rows, true in zip(part, made, given, strict=True):
+                errors[place] = joint_errors(from_features67(true), from_features67(rows)).mean()
+            ids[part] = np.concatenate([level.cpu().numpy() for level in tokens.ids], axis=1)
+            if self.runtime.generator is not None:
+                likelihood[part], predictions[part] = self._predict(batch, tokens)
+            self.tally.add(len(part))
+        cuts = np.cumsum(scales)[:-1]
+        there = self.runtime.generator is not None
+        return Rebuilt(
+            motions.shared(self.spread),
+            self.spread.total(errors),
+            np.split(self.spread.total(ids).astype(np.int64), cuts, axis=1),
+            list(self.spread.total(likelihood).T) if there else [],
+            np.split(self.spread.total(predictions).astype(np.int64), cuts, axis=1) if there else [],
+        )
+
+    # ---- batches --------------------------------------------------------------------------------------------------
+
+    def draw(self, batch: Sequence[Item]) -> "Tensor":
+        """Embeddings [B, T, D] of tokens drawn for the captions of a batch."""
+        captions, rows, seeds = [i.caption for i in batch], [i.rows for i in batch], [i.seed for i in batch]
+        return self.runtime.generate_batch(captions, rows, seeds, self.sampling).embedding
+
+    def _generate(self, batch: Sequence[Item]) -> list[Rows]:
+        captions, rows = [i.caption for i in batch], [i.rows for i in batch]
+        return self.runtime.decode_batch(self.draw(batch), rows, captions, self.guidance)
+
+    def _recorded(self, batch: Sequence[Item]) -> list[Rows]:
+        return [self.library.features(i.index)[i.start : i.start + i.rows] for i in batch]
+
+    def _rebuild(self, batch: Sequence[Item], given: Sequence[Rows]) -> tuple[Any, list[Rows]]:
+        import torch
+
+        runtime, captions, rows = self.runtime, [i.caption for i in batch], [i.rows for i in batch]
+        padded = np.zeros((len(given), max(rows), given[0].shape[1]), np.float32)
+        for line, values in enumerate(given):
+            padded[line, : len(values)] = runtime.normaliser.apply(values)
+        features, lengths = torch.from_numpy(padded).to(runtime.device), torch.tensor(rows, device=runtime.device)
+        quantized = runtime.tokenizer.encode(features, lengths, runtime.texts(captions))
+        return quantized.tokens, runtime.decode_batch(quantized.embedding, rows, captions, 0.0)
+
+    def _predict(self, batch: Sequence[Item], tokens: Any) -> tuple[Floats, NDArray[np.int64]]:
+        """Mean ln p [B, N] of the true tokens a scale, and arg-max predictions [B, S] of all scales, teacher-forced."""
+        import torch
+
+        generator = self.runtime.generator
+        assert generator is not None
+        text = self.runtime.texts([i.caption for i in batch])
+        lengths = torch.tensor([i.rows for i in batch], device=self.runtime.device)
+        logits = generator.logits(tokens, text, lengths)
+        true = [
+            level.double().log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0].mean(dim=1)
+            for level, ids in zip(logits, tokens.ids, strict=True)
+        ]
+        best = torch.cat([level.argmax(dim=-1) for level in logits], dim=1)
+        return torch.stack(true, dim=1).cpu().numpy(), best.cpu().numpy()
+
+    # ---- arrays ---------------------------------------------------------------------------------------------------
+
+    def _measured(self, items: Sequence[Item], source: Callable[[Sequence[Item]], list[Rows]]) -> Motions:
+        motions = _Filling(len(items), self._embeddings(len(items)))
+        for part in self._mine(items):
+            motions.fill(part, source([items[place] for place in part]), self.evaluators)
+            self.tally.add(len(part))
+        return motions.shared(self.spread)
+
+    def _mine(self, items: Sequence[Item]) -> list[list[int]]:
+        return self.spread.mine(portions(items))
+
+    def _embeddings(self, count: int) -> dict[str, Floats]:
+        return {name: np.zeros((count, evaluator.width)) for name, evaluator in self.evaluators.items()}
+
+    def _shared(self, arrays: dict[str, Floats]) -> dict[str, Floats]:
+        return {name: self.spread.total(array) for name, array in arrays.items()}
+
+
+class _Filling:
+    """Arrays over n motions that are filled batch by batch."""
+
+    def __init__(self, count: int, embeddings: dict[str, Floats]) -> None:
+        self.embeddings = embeddings
+        self.sliding, self.drift = np.zeros((2, count))
+
+    def fill(self, part: list[int], rows: list[Rows], evaluators: dict[str, "Evaluator"]) -> None:
+        for name, evaluator in evaluators.items():
+            self.embeddings[name][part] = evaluator.embed_rows(rows)
+        for place, one in zip(part, rows, strict=True):
+            joints = from_features67(one)
+            self.sliding[place], self.drift[place] = foot_sliding(joints), bone_drift(joints)
+
+    def shared(self, spread: Spread) -> Motions:
+        embeddings = {name: spread.total(array) for name, array in self.embeddings.items()}
+        return Motions(embeddings, spread.total(self.sliding), spread.total(self.drift))
