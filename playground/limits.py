@@ -22,11 +22,17 @@ class Limits:
     max_guidance: float = 6.0  # largest g of the detokenizer, and largest s of the generator
     max_temperature: float = 2.0
     max_json_bytes: int = 2 * 1024 * 1024  # size of a token file
+    max_release_bytes: int = 4 * 1024**3  # size of a checkpoint of other authors, training state included
     max_figures: int = 6  # figures on one stage
     queue_size: int = 20  # visitors waiting for the model
     sessions: int = 200  # visitors whose open motion is kept in memory
     session_seconds: int = 3_600  # how long it is kept, and an uploaded file too
     deadline_seconds: float = 30.0  # one live request, checked at every scale
+    max_link_chars: int = 4_000  # of an address that is read
+    max_link_keys: int = 64
+    max_picture_side: int = 1_920  # pixels of a rendered picture or film, the longer side
+    max_picture_frames: int = 200  # frames of a film
+    picture_seconds: float = 120.0  # rendering one picture or film
 
 
 LIMITS = Limits()

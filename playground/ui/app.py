@@ -15,15 +15,18 @@ os.environ.setdefault("GRADIO_ANALYTICS_ENABLED", "False")  # before gradio is i
 import gradio as gr
 
 from playground.limits import LIMITS
+from playground.ui.bar import bar
 from playground.ui.chart import chart_script, plotly_script
 from playground.ui.rooms import ROOMS
 from playground.ui.services import EngineSource, Services
+from playground.ui.state import table_json
 from playground.ui.theme import style_sheet, theme
 
 if TYPE_CHECKING:
     from playground.engine import Engine
 
 TITLE = "Motion Token Playground"
+SCRIPTS = ("page", "state", "bar")  # the browser half of the page, inline in its head
 UPLOADS_CHECKED_EVERY = 600  # seconds between looks for old uploaded files
 
 
@@ -38,7 +41,7 @@ def build(engine: EngineSource = _default_engine) -> gr.Blocks:
     """The page. `engine` is called when something needs it first; a test passes its own."""
     services = Services(engine)
     with gr.Blocks(title=TITLE, delete_cache=(UPLOADS_CHECKED_EVERY, LIMITS.session_seconds), fill_width=True) as page:
-        gr.HTML(_header(), elem_id="mtp-header", apply_default_css=False, js_on_load="window.mtpHeader?.(element);")
+        bar(services, TITLE)
         with gr.Tabs(elem_id="mtp-rooms", overflow_behavior="wrap"):
             for label, room in ROOMS.items():
                 name = label.lower().replace(" ", "-")
@@ -76,20 +79,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     launch(options.host, options.port)
 
 
-def _header() -> str:
-    """The line above the rooms: name, what it is in one sentence, the switch for light and dark."""
-    return (
-        f'<header class="mtp-header"><h1>{TITLE}</h1>'
-        "<p>Motions become tokens, tokens become motions; look at every step.</p>"
-        '<button type="button" class="mtp-dark" aria-label="Switch between light and dark" title="Light or dark">'
-        '<span aria-hidden="true">◐</span></button></header>'
-    )
-
-
 def _head() -> str:
     """What goes into the page's head: our own style and scripts, inline (`css=` would rewrite our selectors)."""
-    page = (Path(__file__).parent / "page.js").read_text(encoding="utf-8")
-    return f"<style>{style_sheet()}</style><script>{page}</script><script>{chart_script()}</script>"
+    here = Path(__file__).parent
+    scripts = [f"window.mtpTable = {table_json()};", chart_script()]
+    scripts += [(here / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS]
+    return f"<style>{style_sheet()}</style>" + "".join(f"<script>{script}</script>" for script in scripts)
 
 
 if __name__ == "__main__":

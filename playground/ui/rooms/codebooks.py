@@ -12,6 +12,7 @@ from playground.ui.chart import chart
 from playground.ui.errors import attach, error_line, message_place
 from playground.ui.facts import Fact, facts_line, table
 from playground.ui.layout import panel, room_frame, words
+from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.services import Services
 from playground.ui.view import View
 
@@ -94,10 +95,17 @@ def room(services: Services) -> None:
                     apply_default_css=False)  # fmt: skip
             gr.HTML(opening.controls.get("table", ""), elem_id="codebooks-table", apply_default_css=False)
         words("codebooks")
+        door = link_door(NAME)
 
     def reorder(wanted: str) -> tuple[Any, ...]:
         if wanted not in opening.charts:
             raise PlaygroundError("codes are ordered by use or by number")
         return (opening.charts[wanted],)
 
+    def arrive(event: gr.EventData) -> tuple[Any, ...]:
+        wanted = asked(event)["order"]
+        return wanted, *reorder(wanted)
+
     attach(order.input, reorder, [order], [plot], message, model=False)
+    arrival(door, arrive, [], [order, plot], message, room=NAME, model=False)
+    commits(NAME, {"order": order}, order.input)

@@ -15,6 +15,7 @@ from playground.ui.chart import chart
 from playground.ui.errors import attach, message_place
 from playground.ui.facts import Fact
 from playground.ui.layout import panel, room_frame, stage_and_score, words
+from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.scenes import clip_scene, token_facts
 from playground.ui.services import Services
 from playground.ui.view import View
@@ -120,11 +121,17 @@ class Handlers:
         system = self.services.default_system()
         bundle = self.services.bundle(system.name)
         view = show(self.services, system, bundle, bundle.position(str(wanted)))
-        return view.stage_json(), view.facts_html(), gr.update(choices=view.controls["near"], value=None)
+        near = gr.update(choices=view.controls["near"], value=None)
+        return view.stage_json(), view.facts_html(), near, view.controls["id"]
 
     def click(self, event: gr.EventData) -> tuple[Any, ...]:
         """A point of a map."""
         return self.put(event.id)
+
+    def arrive(self, event: gr.EventData) -> tuple[Any, ...]:
+        """The clip that a link asks for, or the one that the room opens with."""
+        bundle, wanted = self.services.bundle(self.services.default_system().name), asked(event)["motion"]
+        return self.put(wanted if wanted in bundle.ids else bundle.clips[first_clip(bundle)].id)
 
     def step(self, wanted: str | None) -> tuple[Any, ...]:
         """One of the neighbours."""
@@ -152,10 +159,14 @@ def room(services: Services) -> None:
             )
             gr.HTML(opening.controls.get("about", ""), elem_id="embedding-about", apply_default_css=False)
         words(NAME)
+        current = gr.Textbox(opening.controls.get("id"), visible="hidden", elem_id="embedding-current")
+        door = link_door(NAME)
     do = Handlers(services)
-    shown = [stage, facts, near]
+    shown = [stage, facts, near, current]
     attach(plot.pick, do.click, [], shown, message, stage=STAGE, doing=DOING, trigger_mode="always_last")
-    near.input(None, [near], None, js=RING, api_visibility="private")
+    current.change(None, [current], None, js=RING, api_visibility="private")
+    commits(NAME, {"motion": current}, current.change, forget=("selection",))
+    arrival(door, do.arrive, [], shown, message, room=NAME, stage=STAGE, doing=DOING)
     attach(near.input, do.step, [near], shown, message, stage=STAGE, doing=DOING)
 
 

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
+from functools import partial
 from typing import Any
 
 import gradio as gr
@@ -14,25 +15,31 @@ from playground.text.prompts import normalise
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.facts import Fact, significant
 from playground.ui.layout import panel, room_frame, stage_and_score, words
+from playground.ui.links import asked, commits, link_door
 from playground.ui.scenes import generated_scene, token_facts
 from playground.ui.services import Services
+from playground.ui.state import control
 from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
 NAME = "generate"
 LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens with every one of them."
 PROMPTS = (
-    "a person steadily walks forward",
+    control(NAME, "prompt").default,
     "someone jogs",
     "a person turns left while walking",
     "a person is waving with both hands",
 )
-OPENING_SECONDS = 5.0
+OPENING_SECONDS = float(control(NAME, "seconds").default)
 DOING = "Choosing the first tokens"
 ENTROPY_CARD = (
     "How undecided the generator was, on average over its tokens: at 0 bit one code was certain, at 3 bit it was like "
     "drawing one of eight. Faint cells are unsure ones."
 )
+
+
+STEPS = (0.1, 0.1, 0.05, 0.01, 0.01)  # of the sampling sliders
+WISHES = ("prompt", "free", "seconds", "seed", "g", "s", "temperature", "topk", "topp")  # keys of state.CONTROLS
 
 
 @dataclass(frozen=True)
@@ -111,6 +118,12 @@ class Handlers:
     def __init__(self, services: Services) -> None:
         self.services = services
 
+    def fill(self, event: gr.EventData) -> tuple[Any, ...]:
+        """The controls as a link asks for them, in the order of `Wish.checked`."""
+        state, own = asked(event), self.services.sampling()
+        usual = {"g": own.guidance, "s": own.cfg, "temperature": own.temperature, "topk": own.top_k, "topp": own.top_p}
+        return tuple(state.values.get(key, usual.get(key, state[key])) for key in WISHES)
+
     def begin(self, control: Control) -> tuple[Any, ...]:
         """At the click, before any waiting: "Stop" becomes possible and "Generate" does not."""
         control.stop = False
@@ -143,7 +156,7 @@ class Handlers:
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    control = gr.State(Control(), time_to_live=LIMITS.session_seconds)
+    running = gr.State(Control(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
         with panel("Words become a motion", LEAD):
@@ -152,15 +165,19 @@ def room(services: Services) -> None:
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
             free, *numbers = _knobs(services.sampling())
         words(NAME)
+        door = link_door(NAME)
     do = Handlers(services)
-    inputs = [control, prompt, free, seconds, seed, *numbers]
+    wishes = [prompt, free, seconds, seed, *numbers]
     buttons = [go, cancel]
     quick: dict[str, Any] = {"queue": False, "api_visibility": "private", "show_progress": "hidden"}
-    for event in (go.click, prompt.submit):
-        started = event(do.begin, [control], buttons, **quick)
-        run = attach(started.then, do.generate, inputs, [stage, facts], message, stage=NAME, doing=DOING)
-        run.then(do.end, None, buttons, **quick)
-    cancel.click(do.stop, [control], [cancel], **quick)
+    filled = attach(door.arrive, do.fill, [], wishes, message, model=False)
+    for event in (go.click, prompt.submit, filled.then):
+        started = event(do.begin, [running], buttons, **quick)
+        run = attach(started.then, do.generate, [running, *wishes], [stage, facts], message, stage=NAME, doing=DOING)
+        ended = run.then(do.end, None, buttons, **quick)
+    ended.then(None, None, None, js=f"() => window.mtpState?.settled('{NAME}')", api_visibility="private")
+    commits(NAME, dict(zip(WISHES, wishes, strict=True)), go.click, prompt.submit, forget=("selection",))
+    cancel.click(do.stop, [running], [cancel], **quick)
 
 
 def _controls(opening: View) -> tuple[Any, ...]:
@@ -188,10 +205,9 @@ def _controls(opening: View) -> tuple[Any, ...]:
 def _knobs(default: SamplingDefaults) -> list[Any]:
     """The folded sampling controls in the order of `Wish.checked`; the first one is free-form."""
     with gr.Accordion("Sampling", open=False, elem_classes=["mtp-knobs"]), gr.Row(elem_classes=["mtp-pairs"]):
-        guidance = gr.Slider(0, LIMITS.max_guidance, default.guidance, step=0.1, label="Guidance g, decoder")
-        cfg = gr.Slider(0, LIMITS.max_guidance, default.cfg, step=0.1, label="Guidance s, generator")
-        temperature = gr.Slider(0, LIMITS.max_temperature, default.temperature, step=0.05, label="Temperature")
-        top_k = gr.Slider(0.01, 1, default.top_k, step=0.01, label="Top-k, share of codes")
-        top_p = gr.Slider(0.05, 1, default.top_p, step=0.01, label="Top-p, share of odds")
-        free = gr.Checkbox(False, label="No prompt (free-form)", elem_id="generate-free")
+        guidance, cfg, temperature, top_k, top_p = (
+            gr.Slider(row.low, row.high, value, step=step, label=row.label, elem_id=row.element)
+            for row, value, step in zip(map(partial(control, NAME), WISHES[4:]), astuple(default), STEPS, strict=True)
+        )
+        free = gr.Checkbox(False, label=control(NAME, "free").label, elem_id="generate-free")
     return [free, guidance, cfg, temperature, top_k, top_p]

@@ -8,9 +8,11 @@ import gradio as gr
 from playground.limits import LIMITS
 from playground.ui.errors import attach, message_place
 from playground.ui.layout import panel, room_frame, stage_and_score, words
+from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.scenes import guidance_scene, token_facts
 from playground.ui.services import Services
 from playground.ui.stage.component import stage_call
+from playground.ui.state import control
 from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
@@ -23,7 +25,7 @@ DIFFERENCE = (
     "Not the generator's guidance: that one steers which tokens are chosen. Here the tokens stay as they are and only "
     "their reading changes."
 )
-FIRST = 2.0
+FIRST = float(control(NAME, "g").default)
 FORMULA = '<p class="mtp-formula">m = (1 + g) · m<sub>words</sub> − g · m<sub>wordless</sub></p>'
 DOING = "Decoding twice"
 
@@ -63,6 +65,14 @@ class Handlers:
         view = run(self.services, wanted, text, checked_number(at, "g", 0, LIMITS.max_guidance))
         return view.stage_json(), view.facts_html(), view.controls["caption"]
 
+    def arrive(self, event: gr.EventData) -> tuple[Any, ...]:
+        """What a link asks for, the motion and g included."""
+        state = asked(event)
+        known = {example.id: example for example in self.services.examples()}
+        found = known.get(state["motion"]) or self.services.opening_example()
+        shown = self.again(found.id, state.values.get("caption", found.caption), state["g"])
+        return found.id, state["g"], *shown
+
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
@@ -88,9 +98,14 @@ def room(services: Services) -> None:
             facts = gr.HTML(opening.facts_html(), elem_id="guidance-facts", apply_default_css=False)
             gr.HTML(f'<p class="mtp-aside">{DIFFERENCE}</p>', apply_default_css=False)
         words(NAME)
+        door = link_door(NAME)
     do = Handlers(services)
     shown = [stage, facts, caption]
     attach(example.input, do.choose, [example, g], shown, message, stage=NAME, doing=DOING)
     for event in (caption.submit, go.click):
         attach(event, do.again, [example, caption, g], shown, message, stage=NAME, doing=DOING)
+    arrival(door, do.arrive, [], [example, g, *shown], message, room=NAME, stage=NAME, doing=DOING)
+    commits(NAME, {"motion": example}, example.input, forget=("caption", "selection"))
+    commits(NAME, {"caption": caption}, caption.submit, go.click, forget=("selection",))
+    commits(NAME, {"g": g}, g.change)
     g.change(None, [g], None, js=stage_call(NAME, "setGuidance"), api_visibility="private")

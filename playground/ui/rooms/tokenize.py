@@ -13,8 +13,10 @@ from playground.limits import LIMITS
 from playground.ui.chart import chart
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.layout import panel, room_frame, stage_and_score, words
+from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.scenes import error_fact, token_facts, tokenized_scene
 from playground.ui.services import Services
+from playground.ui.state import OWN_FILE, UPLOADED, control
 from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
 
@@ -28,7 +30,6 @@ LEAD = (
 )
 CHART_HEIGHT = 104
 ENERGY = "% of energy missing after each scale; click a bar to stop there"
-UPLOADED = "uploaded"  # the menu's entry for the visitor's own file
 DOING, AGAIN = "Tokenizing", "Rebuilding"
 MARK_SCALES = """(n) => {
   const stage = window.MotionStage?.get('tokenize');
@@ -142,8 +143,24 @@ class Handlers:
         used = max(1, int(event.id))
         return (*self.rebuild(used, held), used)
 
-    def _show(self, session: Session, note: str = "") -> tuple[Any, ...]:
-        held, view = run(self.services, session)
+    def arrive(self, held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
+        """What a link asks for. A file that its maker brought along is not here: the opening example stands in."""
+        state = asked(event)
+        wanted, upload, note = str(state["motion"] or ""), held.upload if held else None, ""
+        if wanted.startswith(OWN_FILE) and upload is not None:
+            session = Session(UPLOADED, upload, float(state["start"]), upload.caption, upload=upload)
+        else:
+            if wanted.startswith(OWN_FILE):
+                note = f"This link was made with a file of its maker's own, {wanted.removeprefix(OWN_FILE)}; upload it."
+            known = {example.id: example for example in self.services.examples()}
+            found = known.get(wanted) or self.services.opening_example()
+            session = Session(found.id, Source(found.motion(), found.title), 0.0, found.caption, upload=upload)
+        session = replace(session, caption=state.values.get("caption", session.caption))
+        scales = state["scales"]
+        return self._show(session, note, scales.n if scales and scales.kind == "upto" else None)
+
+    def _show(self, session: Session, note: str = "", scales: int | None = None) -> tuple[Any, ...]:
+        held, view = run(self.services, session, scales)
         source = held.source
         assert source is not None
         own = [(f"{held.upload.title} · yours", UPLOADED)] if held.upload else []
@@ -173,6 +190,7 @@ def room(services: Services) -> None:
                 show_label=True,
             )
         words(NAME)
+        door = link_door(NAME)
     do = Handlers(services, opening)
     parts = [session, stage, facts, energy]
     everything = [*parts, example, caption, start, scales]
@@ -198,6 +216,14 @@ def room(services: Services) -> None:
         trigger_mode="always_last",
     )
 
+    arrival(door, do.arrive, [session], everything, message, room=NAME, stage=NAME, doing=DOING)
+    own = ("caption", "start", "scales", "selection")
+    commits(NAME, {"motion": example}, example.input, forget=own)
+    commits(NAME, {"motion": upload}, upload.upload, forget=own)
+    commits(NAME, {"caption": caption}, caption.submit, go.click, forget=("scales", "selection"))
+    commits(NAME, {"start": start}, start.release, forget=("scales", "selection"))
+    commits(NAME, {"scales": scales}, scales.change)
+
 
 def _controls(services: Services, opening: View) -> tuple[Any, ...]:
     """The controls from top to bottom: motion, upload, caption, button, window, scales."""
@@ -211,16 +237,16 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
         )
     with gr.Row(elem_classes=["mtp-line"]):
         caption = gr.Textbox(
-            opening.controls.get("caption", ""), label="Caption (the tokenizer reads it; may be empty)",
+            opening.controls.get("caption", ""), label=control(NAME, "caption").label,
             max_lines=1, elem_id="tokenize-caption", scale=1, min_width=160,
         )  # fmt: skip
         go = gr.Button("Tokenize", variant="primary", size="sm", scale=0, min_width=84, elem_id="tokenize-go")
     start = gr.Slider(
         0, 1, value=0, step=0.1, visible=False, elem_id="tokenize-start",
-        label="The 9.8 s that are tokenized start at second",
+        label=control(NAME, "start").label,
     )  # fmt: skip
     count = int(opening.controls.get("count", 1))
     scales = gr.Slider(
-        1, max(count, 2), value=count, step=1, label="Rebuild from scales 1 to", elem_id="tokenize-scales"
+        1, max(count, 2), value=count, step=1, label=control(NAME, "scales").label, elem_id="tokenize-scales"
     )
     return example, upload, caption, go, start, scales

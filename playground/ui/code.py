@@ -1,0 +1,146 @@
+"""Copy as Python: the state of a room as a script that anyone can run who has the playground, with the same result.
+
+`python_for(room, state)` wants a complete state, as `complete(services, state)` makes one: what the address leaves to
+the page (the opening example, a motion's own caption, the system's own sampling) is filled in, so the script says it.
+A new room adds its rows to state.CONTROLS, a function here, an entry in SCRIPTS, and a line in complete.py where it
+opens with something of its own. Texts enter a script as Python literals, never as they are.
+"""
+
+import json
+import textwrap
+from collections.abc import Callable
+
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+from playground.ui.state import OWN_FILE, Scales, State, controls_of
+
+_MADE = "Made by the Motion Token Playground; run it with the Python that the playground is installed in."
+_TOKENS = """
+for number, level in enumerate({name}.levels, 1):
+    print(f"scale {{number}}:", *level.ids)
+"""
+
+
+def python_for(room: str, state: State) -> str:
+    """The script of a room for a complete state. PlaygroundError for a room that has none."""
+    if room not in SCRIPTS:
+        raise PlaygroundError("there is nothing to copy here; open one of the rooms with a motion or a plot")
+    title, body = SCRIPTS[room](state)
+    return f'"""{title}\n\n{_MADE}\n"""\n\n{textwrap.dedent(body).strip()}\n'
+
+
+def _tokenize(state: State) -> tuple[str, str]:
+    scales = state["scales"]
+    asked, words = ("", "all scales") if scales is None else (f", scales={_scales(scales)}", _in_words(scales))
+    return "A motion becomes tokens, and comes back.", (
+        _opened(state)
+        + f"tokens = engine.tokenize(motion, {_literal(state['caption'])}, system={_literal(state.system)})\n"
+        + f"back = engine.reconstruct(tokens{asked})\n"
+        + _TOKENS.format(name="tokens")
+        + f'print(f"MPJPE, {words}: {{back.mpjpe_mm:.1f}} mm")\n'
+    )
+
+
+def _generate(state: State) -> tuple[str, str]:
+    prompt = "None" if state["free"] else _literal(state["prompt"])
+    given = {"seconds": _number(state["seconds"]), "system": _literal(state.system), "seed": str(state["seed"])}
+    names = {"guidance": "g", "cfg": "s", "temperature": "temperature", "top_k": "topk", "top_p": "topp"}
+    given |= {name: _number(state[key]) for name, key in names.items()}
+    return "Words become a motion, scale by scale.", (
+        "from pathlib import Path\n\nfrom playground.engine import default_engine\n"
+        "from playground.motion.formats import write_motion\n\n"
+        "engine = default_engine()\nmade = engine.generate(\n"
+        f"    {prompt},\n"
+        + "".join(f"    {name}={value},\n" for name, value in given.items())
+        + ")\n"
+        + _TOKENS.format(name="made")
+        + 'write_motion(made.motion, Path("generated.bvh"))\n'
+    )
+
+
+def _guidance(state: State) -> tuple[str, str]:
+    g = _number(state["g"])
+    return "The same tokens, read with the caption and without; g exaggerates the difference.", (
+        _opened(state)
+        + f"tokens = engine.tokenize(motion, {_literal(state['caption'])}, system={_literal(state.system)})\n"
+        + f"guided = engine.reconstruct(tokens, guidance={g})\n"
+        + f"""
+# The same by hand: both decodes, blended. Rows are normalised; the rest of engine.reconstruct turns them into joints.
+pair = engine.guidance_pair(tokens)
+blended = (1 + {g}) * pair.conditional - {g} * pair.unconditional
+"""
+        + _TOKENS.format(name="tokens")
+        + 'print(f"MPJPE: {guided.mpjpe_mm:.1f} mm")\n'
+    )
+
+
+def _embedding_map(state: State) -> tuple[str, str]:
+    return "A motion of the embedding map: where it lies, its tokens, the motion that they stand for.", (
+        "from playground.analysis.bundle import read_bundle\nfrom playground.engine import ASSETS, default_engine\n\n"
+        f'bundle = read_bundle(ASSETS / "analysis", {_literal(state.system)})\n'
+        f"row = bundle.position({_literal(state['motion'])})\n"
+        "tokens = bundle.token_file(row)\nmotion = default_engine().decode(tokens).motion\n"
+        + _TOKENS.format(name="tokens")
+        + 'print("t-SNE:", *bundle.tsne[row], " PCA:", *bundle.pca[row])\n'
+        'print(f"{motion.frames} frames of: {tokens.caption}")\n'
+    )
+
+
+def _codebooks(state: State) -> tuple[str, str]:
+    return "Which codes are used, how evenly, at which scale.", (
+        "from playground.analysis.bundle import read_bundle\nfrom playground.engine import ASSETS\n\n"
+        f'bundle = read_bundle(ASSETS / "analysis", {_literal(state.system)})\nusage = bundle.usage\n'
+        f"order = {_literal(state['order'])}\n"
+        "frequencies = [usage.relative(scale, order) for scale in range(len(bundle.sizes))]\n\n"
+        "print(bundle.provenance)\n"
+        "for scale, (tokens, codes) in enumerate(zip(bundle.sizes, bundle.codes)):\n"
+        "    dead, perplexity = len(usage.dead_[scale]), usage.perplexity_[scale]\n"
+        '    print(f"scale {scale + 1}: {tokens} tokens, {codes} codes, {dead} dead, perplexity {perplexity:.1f}")\n'
+    )
+
+
+SCRIPTS: dict[str, Callable[[State], tuple[str, str]]] = {
+    "tokenize": _tokenize,
+    "embedding-map": _embedding_map,
+    "codebooks": _codebooks,
+    "generate": _generate,
+    "guidance": _guidance,
+}
+
+
+def _opened(state: State) -> str:
+    """The lines that open the engine and give `motion`."""
+    wanted = str(state["motion"])
+    start = float(state["start"]) if any(row.key == "start" for row in controls_of(state.room)) else 0.0
+    poses = LIMITS.max_frames + 1
+    if not wanted.startswith(OWN_FILE):
+        return (
+            "from playground.engine import default_engine\n\nengine = default_engine()\n"
+            f"(example,) = [one for one in engine.examples() if one.id == {_literal(wanted)}]\n"
+            f"motion = example.motion().slice(0, {poses})\n"
+        )
+    first = round(start * LIMITS.fps)
+    return (
+        "from pathlib import Path\n\nfrom playground.engine import default_engine\n"
+        "from playground.motion.formats import read_motion\n\nengine = default_engine()\n"
+        f"motion = read_motion(Path({_literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n"
+        f"motion = motion.slice({first}, {first + poses})\n"
+    )
+
+
+def _scales(scales: Scales) -> str:
+    return str(scales.n) if scales.kind == "upto" else _literal(f"{scales.kind}:{scales.n}")
+
+
+def _in_words(scales: Scales) -> str:
+    words = {"upto": "scales 1 to {}", "only": "scale {} alone", "without": "all but scale {}"}
+    return words[scales.kind].format(scales.n)
+
+
+def _literal(text: object) -> str:
+    """A text as a Python literal in double quotes: a JSON string is one."""
+    return json.dumps(str(text), ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    return repr(float(value)).removesuffix(".0")

@@ -1,0 +1,68 @@
+"""A state with nothing left open: what the address leaves to the page is filled in with what the page would show."""
+
+from collections.abc import Callable
+from typing import Any
+
+from playground.systems import row_of
+from playground.ui.rooms.embedding import first_clip
+from playground.ui.services import Services
+from playground.ui.state import OWN_FILE, State, controls_of
+
+
+def complete(services: Services, state: State) -> State:
+    """The state with every control of its room given. PlaygroundError where nothing is shipped to fill it with."""
+    filled = state
+    for row in controls_of(state.room):
+        if filled.values.get(row.key) is None or (row.key == "motion" and not _is_there(services, filled)):
+            value = row.default if row.default is not None else FILLS.get(row.key, _nothing)(services, filled)
+            filled = filled.with_values(**{row.key: value})
+    return filled
+
+
+def _is_there(services: Services, state: State) -> bool:
+    """Whether the motion of a state is one that the page has, or a file that the tokenizer's room may have."""
+    wanted = str(state.values["motion"])
+    if state.room == "embedding-map":
+        return wanted in services.bundle(str(state.system)).ids
+    return wanted.startswith(OWN_FILE) or any(example.id == wanted for example in services.examples())
+
+
+def _nothing(services: Services, state: State) -> Any:
+    return None
+
+
+def _system(services: Services, state: State) -> tuple[str, ...]:
+    return (services.default_system().name,)
+
+
+def _motion(services: Services, state: State) -> str:
+    if state.room != "embedding-map":
+        return services.opening_example().id
+    bundle = services.bundle(str(state.system))
+    return bundle.clips[first_clip(bundle)].id
+
+
+def _caption(services: Services, state: State) -> str:
+    """The motion's own caption; a file's is not known here."""
+    wanted = str(state["motion"])
+    return "" if wanted.startswith(OWN_FILE) else services.example(wanted).caption
+
+
+def _sampling(name: str) -> Callable[[Services, State], float]:
+    def fill(services: Services, state: State) -> float:
+        return float(getattr(row_of(str(state.system)).sampling, name))
+
+    return fill
+
+
+# Key -> what stands there when the address does not say; in the order of the table, so `motion` knows the system.
+FILLS: dict[str, Callable[[Services, State], Any]] = {
+    "system": _system,
+    "motion": _motion,
+    "caption": _caption,
+    "g": _sampling("guidance"),
+    "s": _sampling("cfg"),
+    "temperature": _sampling("temperature"),
+    "topk": _sampling("top_k"),
+    "topp": _sampling("top_p"),
+}
