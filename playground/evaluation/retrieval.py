@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from playground.data.batches import Sample
 from playground.errors import PlaygroundError
+from playground.evaluation.metrics import r_precision
 
 POOLS = (32, 100)
 TOPS = (1, 2, 3)
@@ -29,19 +30,16 @@ class Embedder(Protocol):
         """Texts -> [n, D]."""
 
 
-def found(distances: NDArray[np.floating], right: NDArray[np.bool_], tops: Sequence[int]) -> NDArray[np.float64]:
-    """Share of texts with a right motion among their nearest, one number a top.
+def ceiling(alike: NDArray[np.bool_], pool: int, rng: np.random.Generator) -> list[float]:
+    """Expected share of own motions in the top 1, 2, 3 for a reader to whom the motions alike are one; [tops].
 
-    distances: [n, n], texts in rows; right: bool [n, n]. A wrong motion that is exactly as near counts as nearer.
+    alike: bool [n, n], row by row the motions that a text cannot tell from its own, own included. The pools are those
+    of `r_precision` with the same rng state.
     """
-    best = np.where(right, distances, np.inf).min(axis=1)
-    before = ((distances <= best[:, None]) & ~right).sum(axis=1)
-    return np.array([(before < top).mean() for top in tops])
-
-
-def ceiling(alike: NDArray[np.bool_], tops: Sequence[int]) -> NDArray[np.float64]:
-    """Expected share of own motions found by a reader to whom the motions alike [n, n] (own included) are one."""
-    return np.array([np.minimum(1.0, top / alike.sum(axis=1)).mean() for top in tops])
+    order = rng.permutation(len(alike))
+    pools = [order[start : start + pool] for start in range(0, len(order) - pool + 1, pool)]
+    counts = np.concatenate([alike[np.ix_(rows, rows)].sum(axis=1) for rows in pools])
+    return [float(np.minimum(1.0, top / counts).mean()) for top in TOPS]
 
 
 def retrieval(
@@ -54,9 +52,8 @@ def retrieval(
 ) -> dict[str, Any]:
     """{"n", "repeats", "seed", and for each pool a table {reading: {"top1": {"mean", "ci95"}, ...}}}.
 
-    Every repeat draws one caption a clip and new pools; the last, partial pool is left out. A pool larger than the
-    sample has no table. ci95 is 1.96 standard deviations over the root of the repeats. PlaygroundError if no clip has
-    a caption.
+    Every repeat draws one caption a clip and new pools. A pool larger than the sample has no table. ci95 is 1.96
+    standard deviations over the root of the repeats. PlaygroundError if no clip has a caption.
     """
     kept = [sample for sample in samples if sample.captions]
     if not kept:
@@ -76,37 +73,19 @@ def retrieval(
             continue
         runs = []
         for repeat in range(repeats):
-            rng = np.random.default_rng([seed, 4, pool, repeat])
-            drawn = np.array([rng.choice(rows) for rows in own])
-            order = rng.permutation(len(kept))
-            runs.append(_one_run(texts[drawn], motions, drawn, owners, actions, order, pool))
+            key = [seed, 4, pool, repeat]
+            drawn = np.array([np.random.default_rng([*key, clip]).choice(rows) for clip, rows in enumerate(own)])
+            scores = [
+                [r_precision(texts[drawn], motions, pool, top, np.random.default_rng(key), groups) for top in TOPS]
+                for groups in (None, drawn.tolist())
+            ]
+            bounds = [
+                ceiling(alike, pool, np.random.default_rng(key))
+                for alike in (owners[drawn], actions[:, None] == actions)
+            ]
+            runs.append(np.array([*scores, *bounds], np.float64))
         tables[f"pool{pool}"] = _table(np.stack(runs))
     return {"n": len(kept), "repeats": repeats, "seed": seed, **tables}
-
-
-def _one_run(
-    texts: NDArray[np.float32],
-    motions: NDArray[np.float32],
-    drawn: NDArray[np.int64],
-    owners: NDArray[np.bool_],
-    actions: NDArray[np.str_],
-    order: NDArray[np.int64],
-    pool: int,
-) -> NDArray[np.float64]:
-    """Means over all whole pools of one order: [readings, tops]."""
-    scores = []
-    for start in range(0, len(order) - pool + 1, pool):
-        rows = order[start : start + pool]
-        distances = np.linalg.norm(texts[rows, None].astype(np.float64) - motions[None, rows], axis=-1)
-        scores.append(
-            [
-                found(distances, np.eye(pool, dtype=np.bool_), TOPS),
-                found(distances, drawn[rows, None] == drawn[None, rows], TOPS),
-                ceiling(owners[drawn[rows]][:, rows], TOPS),
-                ceiling(actions[rows, None] == actions[None, rows], TOPS),
-            ]
-        )
-    return np.mean(scores, axis=0)
 
 
 def _table(runs: NDArray[np.float64]) -> dict[str, dict[str, dict[str, float]]]:
