@@ -15,7 +15,10 @@ In a room:
 
 In a notebook: IPython.display.HTML(stage_frame(payload)), or stage_page(payload) for a whole page.
 In the browser: MotionStage.get(name) has setPayload, busy, fail, setGuidance, setScale, play, pause, seek, select,
-selectSpan, setSpanMode, on, state. One name, one stage; stages in hidden tabs rest.
+selectSpan, setSpanMode, getState, setState, snapshot, on, state. One name, one stage; stages in hidden tabs rest.
+
+Links: getState() -> {frame, scale, mode, selection, span, speed}; on("state", listener) tells of it once it has come to
+rest; setState(part of it) puts it back, before the first payload too, and passes over what does not fit.
 """
 
 import html
@@ -32,8 +35,9 @@ from playground.figures.stage import Json
 
 _HERE = Path(__file__).parent
 _MODULES = (
-    "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "labels", "figures", "rows",
-    "score", "timeline", "toolbar", "gestures", "keys", "notices", "stage", "index",
+    "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "labels", "lanes", "rows",
+    "strips", "figures", "cells", "heads", "light", "cursor", "score", "brush", "timeline", "toolbar", "gestures",
+    "keys", "notices", "links", "pace", "snapshot", "remote", "surroundings", "stage", "index",
 )  # fmt: skip
 # The first stage that is shown fetches the modules, once a page; with stage_script() in its head a page has them.
 _ON_LOAD = """

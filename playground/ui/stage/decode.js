@@ -32,7 +32,16 @@ function decodeLevel(level) {
     rgb,
     entropy: level.entropy ? floatsOf(level.entropy) : null,
     spans: level.spans ? shortsOf(level.spans) : null,
+    marks: level.marks ? bytesOf(level.marks) : null,
   };
+}
+
+function decodeStrip(strip) {
+  const values = floatsOf(strip.values), frames = values.length / strip.rows.length;
+  if (!Number.isInteger(frames)) {
+    throw new Error(`This result cannot be shown: strip "${strip.name}" does not fill its ${strip.rows.length} rows.`);
+  }
+  return { ...strip, values, frames };
 }
 
 function decodeFeatures(block) {
@@ -71,5 +80,8 @@ export function decodePayload(payload) {
     tracks: (payload.tracks || []).map((track) => ({ ...track, levels: track.levels.map(decodeLevel) })),
     features: decodeFeatures(payload.features),
     badge: payload.badge || null,
+    strips: (payload.strips || []).map(decodeStrip),
+    hatch: payload.hatch || [],
+    hatched: payload.hatched || "kept as it was",
   };
 }

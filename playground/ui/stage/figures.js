@@ -3,18 +3,15 @@
 import { css, mix, readable, systemColour } from "./colour.js";
 import { project } from "./camera.js";
 import { clear } from "./dom.js";
-import { findContacts, paintContacts, paintFade, paintGrid, paintShadow, paintWay } from "./floor.js";
+import { findContacts, paintContacts, paintFade, paintGrid, paintJoints, paintShadow, paintWay } from "./floor.js";
 import { guidedJoints } from "./guidance.js";
 import { Labels } from "./labels.js";
+import { AIR, WORDS, arrange, reachOf, smoothRoot, tallOf } from "./lanes.js";
 import { Painter, tonesOf } from "./paint.js";
 import { createBody } from "./skeleton.js";
-import { locate, spanOf } from "./store.js";
+import { litToken } from "./store.js";
+import { jointsOf } from "./strips.js";
 
-const WORDS = 44; // pixels under the figures that belong to their names
-const AIR = 10; // pixels above them
-const NAME = 116; // pixels that a name and its caption need
-const CROWD = 4; // figures from which on a narrow picture gets two rows
-const SMOOTH = 10; // frames on either side over which the followed point is averaged
 const REACHING = [ // joints that a body reaches farthest with
   "pelvis", "head", "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_knee", "r_knee",
   "l_foot", "r_foot",
@@ -25,6 +22,7 @@ export class Figures {
     Object.assign(this, { canvas, store, camera });
     this.labels = new Labels(labels, canvas);
     Object.assign(this, { data: null, figures: [], theme: null, ratio: 1, spacing: 1.2, rows: 1, across: 1 });
+    this.plain = false; // whether bodies are painted without shades, which is faster
     this.ctx = canvas.getContext("2d", { alpha: false });
     this.layer = document.createElement("canvas"); // where a figure is painted that is to be seen through
   }
@@ -84,10 +82,15 @@ export class Figures {
     this.ratio = ratio;
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
-    const many = this.figures.length >= CROWD && this.store.state.layout === "lanes";
-    this.rows = many && width < 1.5 * height ? 2 : 1; // a phone shows many figures in two rows
-    this.across = Math.max(1, Math.ceil(this.figures.length / this.rows));
+    Object.assign(this, this.plan(width, height));
     this.camera.resize(width, height / this.rows, AIR, WORDS);
+  }
+
+  // In how many rows the figures stand, and how far apart.
+  plan(width, height) {
+    const count = this.figures.length;
+    if (!count || this.store.state.layout !== "lanes") return { rows: 1, across: Math.max(1, count) };
+    return arrange(count, width, height, reachOf(this.figures, this.width, this.reaching), this.tall());
   }
 
   // Lanes lie along the camera's right-hand direction, so figures stay side by side from every angle.
@@ -97,22 +100,8 @@ export class Figures {
     return [this.camera.right[0] * metres, this.camera.right[2] * metres];
   }
 
-  // Wide enough for the widest gesture, wider where the picture has room to spare.
-  laneSpacing(tall) {
-    let half = 0.45;
-    for (const { joints, frames, centre } of this.figures) {
-      for (let t = 0; t < frames; t += 3) {
-        for (const j of this.reaching) {
-          const at = t * this.width + j;
-          half = Math.max(half, Math.hypot(joints[at] - centre[2 * t], joints[at + 2] - centre[2 * t + 1]));
-        }
-      }
-    }
-    const least = Math.min(2, Math.max(0.85, 1.3 * half));
-    const { width, height } = this.camera;
-    const pixel = tall / Math.max(1, height - AIR - WORDS); // metres
-    const most = Math.max(1.9, NAME * pixel), room = (pixel * width) / this.across;
-    return Math.max(least, Math.min(most, 0.95 * room));
+  tall() {
+    return tallOf(this.figures, this.width, this.head);
   }
 
   // The point that the camera follows at a frame: the first figure's way, smoothed; the origin when it does not follow.
@@ -128,9 +117,7 @@ export class Figures {
   fit() {
     if (!this.figures.length) return;
     const { follow } = this.store.state;
-    const heads = this.figures.map(({ joints }) => maxEvery(joints, this.width, this.head + 1));
-    const tall = Math.max(1.6, ...heads) + 0.2;
-    this.spacing = this.laneSpacing(tall);
+    const tall = this.tall();
     this.camera.place();
     const points = [], box = [Infinity, -Infinity, Infinity, -Infinity];
     this.figures.forEach(({ joints, frames }, index) => {
@@ -192,7 +179,7 @@ export class Figures {
     const lanes = this.figures.map((_, index) => this.laneOf(index));
     for (let row = 0; row < this.rows; row++) this.drawRow(row * this.across, lanes, frame, row * camera.height);
     const spots = this.figures.map((figure, index) => this.labelSpot(figure, index, lanes[index], frame));
-    this.labels.place(spots, camera.width / this.across);
+    this.labels.place(spots, camera.width / this.across, this.across);
   }
 
   // Where the name of a figure goes: under it where figures have lanes, beside the others where they have one spot.
@@ -226,20 +213,13 @@ export class Figures {
     const now = Math.min(frame, figure.frames - 1);
     const way = (alpha, line, span, rgb = figure.rgb) =>
       paintWay(ctx, camera, css(rgb, alpha), line, figure.joints, this.width, span, dx, dz);
-    const last = figure.frames - 1, lit = this.litSpan();
+    const last = figure.frames - 1, lit = litToken(data.tracks, this.store.state)?.span;
     if (trail) way(0.85, 2, [0, now]);
     if (trail) way(0.28, 1.5, [now, last]);
     if (lit) way(1, 4, lit.map((frame) => Math.min(frame, last)), theme.focus);
     this.poseAt(figure, frame);
     paintShadow(ctx, camera, theme, this.pose, data.skeleton.parents, dx, dz);
     paintContacts(ctx, camera, figure.rgb, figure.contacts, now, data.fps, dx, dz, trail);
-  }
-
-  // Frames of the token under the pointer, or of the chosen one: their part of the way lights up on the floor.
-  litSpan() {
-    const { hover, selection } = this.store.state, { tracks } = this.data;
-    const cell = hover || locate(tracks, selection);
-    return cell && spanOf(tracks[cell.track], cell.level, cell.position);
   }
 
   drawFigure(figure, [dx, dz], frame) {
@@ -253,43 +233,27 @@ export class Figures {
     }
     this.poseAt(figure, frame);
     this.projectBody(dx, dz);
-    if (frame >= figure.frames + 0.5) this.paintThrough(figure, 0.45); // a shorter motion has ended and waits
-    else if (layout === "overlay" && figures.length > 1) this.paintThrough(figure, figure === figures[0] ? 0.9 : 0.68);
-    else painter.paint(ctx, screen, camera.focal, figure.tones);
+    const span = litToken(this.data.tracks, this.store.state)?.span;
+    const look = { plain: this.plain, halo: span && frame >= span[0] && frame < span[1] ? css(theme.focus) : null };
+    if (frame >= figure.frames + 0.5) this.paintThrough(figure, 0.45, look); // a shorter motion has ended and waits
+    else if (layout === "overlay" && figures.length > 1) this.paintThrough(figure, figure === figures[0] ? 0.9 : 0.68, look);
+    else painter.paint(ctx, screen, camera.focal, figure.tones, look);
+    const { probe } = this.store.state, marked = probe && jointsOf(this.data.strips[probe.strip], probe.row);
+    if (marked) paintJoints(ctx, camera, theme, this.pose, this.data.skeleton.parents, marked, dx, dz);
   }
 
   // Paints the projected body as one see-through shape, without its inside showing.
-  paintThrough(figure, alpha) {
+  paintThrough(figure, alpha, look) {
     const { canvas, layer, ctx } = this;
     if (layer.width !== canvas.width) layer.width = canvas.width; // setting a size clears and costs
     if (layer.height !== canvas.height) layer.height = canvas.height;
     const over = clear(layer, 1);
     over.setTransform(ctx.getTransform());
-    this.painter.paint(over, this.screen, this.camera.focal, figure.tones);
+    this.painter.paint(over, this.screen, this.camera.focal, figure.tones, look);
     ctx.save();
     ctx.setTransform(1, 0, 0, 1, 0, 0);
     ctx.globalAlpha = alpha;
     ctx.drawImage(layer, 0, 0);
     ctx.restore();
   }
-
-}
-
-function maxEvery(array, step, from) {
-  let most = -Infinity;
-  for (let i = from; i < array.length; i += step) most = Math.max(most, array[i]);
-  return most;
-}
-
-// Root x, z averaged over neighbouring frames: what the camera follows without shaking at every step.
-function smoothRoot(joints, frames, width) {
-  const out = new Float32Array(frames * 2);
-  for (let t = 0; t < frames; t++) {
-    const from = Math.max(0, t - SMOOTH), to = Math.min(frames - 1, t + SMOOTH);
-    for (let s = from; s <= to; s++) {
-      out[2 * t] += joints[s * width] / (to - from + 1);
-      out[2 * t + 1] += joints[s * width + 2] / (to - from + 1);
-    }
-  }
-  return out;
 }

@@ -129,6 +129,30 @@ export function paintContacts(ctx, camera, rgb, contacts, frame, fps, dx, dz, al
   }
 }
 
+// The bones of a part of the body, and one joint of it, marked on top of the figure. marked: {joint, group}.
+export function paintJoints(ctx, camera, theme, pose, parents, { joint, group }, dx, dz) {
+  const at = (j) => {
+    project(camera, pose[3 * j] + dx, pose[3 * j + 1], pose[3 * j + 2] + dz, spot, 0);
+    return [spot[0], spot[1]];
+  };
+  const [x, y] = at(joint);
+  ctx.lineCap = ctx.lineJoin = "round";
+  for (const [color, wide, radius] of [[theme.surface, 6, 7], [theme.focus, 3, 5]]) {
+    ctx.strokeStyle = ctx.fillStyle = css(color);
+    ctx.lineWidth = wide;
+    ctx.beginPath();
+    for (const j of group) {
+      if (parents[j] < 0 || !group.includes(parents[j])) continue;
+      ctx.moveTo(...at(parents[j]));
+      ctx.lineTo(...at(j));
+    }
+    ctx.stroke();
+    ctx.beginPath();
+    ctx.arc(x, y, radius, 0, 2 * Math.PI);
+    ctx.fill();
+  }
+}
+
 // A part [from, to] (frames) of the pelvis's way over the floor; width: numbers in a pose.
 export function paintWay(ctx, camera, color, line, joints, width, [from, to], dx, dz) {
   const last = joints.length / width - 1;

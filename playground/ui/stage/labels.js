@@ -2,6 +2,8 @@
 
 import { el } from "./dom.js";
 
+const TIGHT = 124; // pixels a name: with less, names are written smaller
+
 export class Labels {
   constructor(element, canvas) {
     Object.assign(this, { element, canvas, nodes: [], places: [] });
@@ -28,13 +30,16 @@ export class Labels {
     this.nodes.forEach((node, index) => node.style.setProperty("--system", colors[index]));
   }
 
-  // spots: [x, y] of the middle of each label's upper edge; room: pixels that one may be wide.
-  place(spots, room) {
+  // spots: [x, y] of the middle of each label's upper edge, `across` of them in a row; room: pixels a lane has at most.
+  place(spots, room, across) {
+    const gaps = spots.slice(1).map(([x, y], index) => (spots[index][1] === y ? Math.abs(x - spots[index][0]) : room));
+    const least = Math.round(Math.min(room, across > 1 ? Math.min(...gaps) : room));
+    this.element.classList.toggle("is-tight", least < TIGHT);
     spots.forEach(([x, y], index) => {
       const place = `translate(${Math.round(x)}px, ${Math.round(y)}px) translateX(-50%)`;
-      if (this.places[index] === place + room) return;
-      this.places[index] = place + room;
-      Object.assign(this.nodes[index].style, { transform: place, maxWidth: `${Math.max(room - 8, 56)}px` });
+      if (this.places[index] === place + least) return;
+      this.places[index] = place + least;
+      Object.assign(this.nodes[index].style, { transform: place, maxWidth: `${Math.max(least - 3, 52)}px` });
     });
   }
 }

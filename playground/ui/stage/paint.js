@@ -8,6 +8,7 @@ const SIN = Float64Array.from({ length: TURN }, (_, k) => Math.sin((2 * Math.PI 
 const WHITE = [255, 255, 255], BLACK = [10, 12, 16];
 const LIGHT = [0.62, 0.78]; // from the upper left, in the picture
 const OUTLINE = 2.4; // CSS pixels, half of it hidden under the fill
+const HALO = 8; // likewise
 
 // Shades of one figure: left limbs lighter, right limbs darker, the trunk between; each as [lit, base, shade].
 export function tonesOf(rgb, theme) {
@@ -56,10 +57,12 @@ export class Painter {
     this.order.sort((a, b) => b.depth - a.depth);
   }
 
-  paint(ctx, screen, focal, tones) {
+  // halo: colour of a broad line round the body, or null; plain: one shade a shape, where time is short.
+  paint(ctx, screen, focal, tones, { halo = null, plain = false } = {}) {
     this.measure(screen, focal);
     ctx.lineJoin = "bevel"; // hulls turn so little at each corner that it does not show
     ctx.lineCap = "butt";
+    if (halo) this.silhouette(ctx, halo, HALO);
     this.silhouette(ctx, tones.outline);
     ctx.strokeStyle = tones.inner;
     ctx.lineWidth = 1.5;
@@ -69,7 +72,7 @@ export class Painter {
       ctx.stroke();
       ctx.beginPath();
       for (const part of shape.parts) trace(ctx, part.points);
-      ctx.fillStyle = light(ctx, shape.parts, tones[shape.tone]);
+      ctx.fillStyle = plain ? tones[shape.tone][1] : light(ctx, shape.parts, tones[shape.tone]);
       ctx.fill();
     }
   }
@@ -83,11 +86,11 @@ export class Painter {
   }
 
   // The path of the whole body, stroked in the outline's colour.
-  silhouette(ctx, color) {
+  silhouette(ctx, color, wide = OUTLINE) {
     ctx.beginPath();
     for (const shape of this.shapes) for (const part of shape.parts) trace(ctx, part.points);
     ctx.strokeStyle = color;
-    ctx.lineWidth = OUTLINE;
+    ctx.lineWidth = wide;
     ctx.stroke();
   }
 }

@@ -1,57 +1,77 @@
-// The score: a piano roll of tokens. One canvas holds what stands still, one over it what moves.
+// The score: a piano roll of tokens, heat maps under it. One canvas holds what stands still, one over it what moves.
 
-import { css, mix, textOn } from "./colour.js";
+import { paintHatch, paintRow } from "./cells.js";
+import { css } from "./colour.js";
+import { Cursor } from "./cursor.js";
 import { clear, el, sizeCanvas } from "./dom.js";
-import { cellAt, cellEdges, describeCell, isUsed, layRows } from "./rows.js";
-import { locate, spanOf, tokenAt } from "./store.js";
+import { keyLines, stripHead, summary, trackHead } from "./heads.js";
+import { paintLight } from "./light.js";
+import { cellAt, describeCell, describeProbe, isUsed, layRows, probeAt } from "./rows.js";
+import { locate, tokenAt } from "./store.js";
+import { heatMap, namesWidth, paintNames, paintStrip, rampCss, tellStrip } from "./strips.js";
 
-export const GUTTER = 36; // pixels left of the roll, for the scales' numbers
+const GUTTER = 36; // pixels left of the roll, for the scales' numbers
 export const MARGIN = 14; // pixels right of it, so that the playhead's end is seen
 const NARROW = 9; // pixels: where the finest cell would be narrower than this,
 const WIDER = 13; // it gets this many, and the roll scrolls sideways inside itself
-const DIGIT = 6.2; // pixels of one digit of an id
 
 export class Score {
   // onView is told which frames are in sight, [from, to], or null when all are.
   constructor(store, { onView }) {
     Object.assign(this, { store, onView, data: null, laid: layRows([]), width: 0, ratio: 1, theme: null });
+    this.gutterWidth = GUTTER;
     this.gutter = el("canvas", { class: "ms-gutter", "aria-hidden": "true" });
-    this.still = el("canvas", { class: "ms-still", role: "img", "aria-label": "Tokens" });
+    this.still = el("canvas", { class: "ms-still", "aria-hidden": "true" });
     this.moving = el("canvas", { class: "ms-moving", "aria-hidden": "true" });
     this.playhead = el("i", { class: "ms-playhead" });
-    this.roll = el("div", { class: "ms-roll" }, this.still, this.moving, this.playhead);
-    this.scroller = el("div", { class: "ms-scroll", role: "group", "aria-label": "Tokens over time" }, this.roll);
+    this.roll = el("div", { class: "ms-roll", role: "presentation" }, this.still, this.moving, this.playhead);
+    this.scroller = el("div", { class: "ms-scroll", role: "grid", "aria-label": "Tokens over time" }, this.roll);
     this.heads = el("div", { class: "ms-heads" });
+    this.key = el("div", { class: "ms-key", hidden: true });
     this.tip = el("div", { class: "ms-tip", role: "tooltip", hidden: true });
-    this.element = el("div", { class: "ms-tracks", hidden: true }, this.gutter, this.scroller, this.heads, this.tip);
+    const roll = el("div", { class: "ms-rolls" }, this.gutter, this.scroller, this.heads);
+    this.element = el("div", { class: "ms-tracks", hidden: true }, roll, this.key, this.tip);
+    this.cursor = new Cursor(this);
     this.listen();
   }
 
   setData(data) {
     this.data = data;
-    this.laid = layRows(data.tracks);
-    this.element.hidden = !data.tracks.length;
-    this.still.setAttribute("aria-label", summary(data.tracks));
-    this.heads.replaceChildren(...data.tracks.map((track, index) => this.head(track, this.laid.heads[index].y)));
+    this.laid = layRows(data.tracks, data.strips);
+    this.maps = null;
+    this.element.hidden = !data.tracks.length && !data.strips.length;
+    const told = [summary(data), ...data.strips.map((strip) => tellStrip(strip, data.fps))];
+    this.scroller.setAttribute("aria-label", told.join(" "));
+    this.trackHeads = data.tracks.map((track, index) => this.noted(trackHead(track, this.laid.heads[index].y), track));
+    this.stripHeads = data.strips.map((strip, index) => stripHead(strip, this.laid.stripHeads[index].y));
+    this.heads.replaceChildren(...this.trackHeads, ...this.stripHeads);
+    const key = keyLines(data);
+    this.key.replaceChildren(...key);
+    this.key.hidden = !key.length;
     this.under = null;
     this.showTip(null);
   }
 
   dress(theme) {
     this.theme = theme;
-    this.data?.tracks.forEach((track, index) => {
-      this.heads.children[index].style.setProperty("--system", theme.dark ? track.dark_color : track.color);
+    if (!this.data) return;
+    this.data.tracks.forEach((track, index) => {
+      this.trackHeads[index].style.setProperty("--system", theme.dark ? track.dark_color : track.color);
     });
+    this.stripHeads.forEach((head) => head.style.setProperty("--ramp", rampCss(theme)));
+    this.maps = this.data.strips.map((strip) => heatMap(strip, theme));
   }
 
   resize(full, ratio) {
-    const room = full - GUTTER;
+    this.gutterWidth = Math.max(GUTTER, namesWidth(this.data.strips, full));
+    const room = full - this.gutterWidth;
     const finest = Math.max(1, ...this.data.tracks.flatMap((track) => track.levels.map((level) => level.size)));
     this.ratio = ratio;
     this.width = room - MARGIN < finest * NARROW ? Math.min(1200, finest * WIDER) : room - MARGIN;
+    this.scroller.style.marginLeft = `${this.gutterWidth}px`;
     this.roll.style.width = `${this.width + MARGIN}px`;
     this.roll.style.height = `${this.laid.height}px`;
-    sizeCanvas(this.gutter, GUTTER, this.laid.height, ratio);
+    sizeCanvas(this.gutter, this.gutterWidth, this.laid.height, ratio);
     for (const canvas of [this.still, this.moving]) sizeCanvas(canvas, this.width + MARGIN, this.laid.height, ratio);
     this.tellView();
   }
@@ -59,8 +79,6 @@ export class Score {
   tellView() {
     const { clientWidth: seen, scrollLeft } = this.scroller;
     const scrolls = this.data && seen > 0 && seen < this.width + MARGIN - 1;
-    this.scroller.toggleAttribute("tabindex", scrolls);
-    if (scrolls) this.scroller.tabIndex = 0;
     if (!scrolls) return this.onView(null);
     const frameAt = (x) => Math.min(Math.max((x / this.width) * this.data.frames, 0), this.data.frames);
     this.onView([frameAt(scrollLeft), frameAt(scrollLeft + seen)]);
@@ -75,53 +93,46 @@ export class Score {
   }
 
   ready() {
-    return this.data && this.theme && this.data.tracks.length && this.width > 1;
+    return this.data && this.theme && this.laid.height > 0 && this.width > 1;
   }
 
   drawStill() {
     if (!this.ready()) return;
-    const ctx = clear(this.still, this.ratio), side = clear(this.gutter, this.ratio);
+    const { data, theme, width, laid } = this, { scale, scaleMode } = this.store.state;
+    const ctx = clear(this.still, this.ratio);
     ctx.textAlign = "center";
+    ctx.textBaseline = "middle";
+    ctx.font = `10px ${theme.font}`;
+    for (const row of laid.rows) {
+      const alpha = isUsed(row.level, scale, scaleMode) ? 1 : scaleMode === "focus" ? 0.4 : 0.16;
+      paintRow(ctx, data.tracks[row.track], row, data.frames, width, theme, alpha);
+      for (const [from, to] of data.hatch) {
+        const x = (from / data.frames) * width, end = Math.min(to, data.tracks[row.track].frames) / data.frames;
+        paintHatch(ctx, x, row.y, end * width - x, row.height, "rgba(17,18,20,0.34)");
+      }
+    }
+    for (const place of laid.strips) {
+      paintStrip(ctx, data.strips[place.strip], this.maps[place.strip], place, data.frames, width, theme);
+    }
+    this.drawGutter();
+  }
+
+  drawGutter() {
+    const { theme, laid, gutterWidth, data } = this, { scale, probe } = this.store.state;
+    const side = clear(this.gutter, this.ratio);
     side.textAlign = "right";
-    ctx.textBaseline = side.textBaseline = "middle";
-    ctx.font = `10px ${this.theme.font}`;
-    for (const row of this.laid.rows) {
-      this.drawRow(ctx, row);
-      const chosen = this.store.state.scale === row.level + 1;
-      side.font = `${chosen ? "700 " : ""}11px ${this.theme.font}`;
-      side.fillStyle = css(chosen ? this.theme.text : this.theme.muted);
-      side.fillText(String(row.level + 1), GUTTER - 8, row.y + row.height / 2 + 0.5);
+    side.textBaseline = "middle";
+    for (const row of laid.rows) {
+      const chosen = scale === row.level + 1;
+      side.font = `${chosen ? "700 " : ""}11px ${theme.font}`;
+      side.fillStyle = css(chosen ? theme.text : theme.muted);
+      side.fillText(String(row.level + 1), gutterWidth - 8, row.y + row.height / 2 + 0.5);
     }
-  }
-
-  drawRow(ctx, row) {
-    const track = this.data.tracks[row.track], level = track.levels[row.level], { scale, scaleMode } = this.store.state;
-    const digits = String(level.codes - 1).length, cell = this.width * (track.frames / this.data.frames / level.size);
-    const written = cell > DIGIT * digits + 3; // all ids of a row, or none
-    ctx.globalAlpha = isUsed(row.level, scale, scaleMode) ? 1 : scaleMode === "focus" ? 0.4 : 0.16;
-    for (let position = 0; position < level.size; position++) {
-      const [from, to] = cellEdges(track, row.level, position, this.data.frames, this.width);
-      const wide = to - from - (to - from > 5 ? 1 : to - from > 2 ? 0.5 : 0);
-      const box = [from, row.y + 0.5, wide, row.height - 1];
-      if (!level.ids) {
-        drawPending(ctx, box, this.theme);
-        continue;
-      }
-      const rgb = this.cellColour(level, position), text = String(level.ids[position]);
-      ctx.fillStyle = css(rgb);
-      fillCell(ctx, box);
-      if (written) {
-        ctx.fillStyle = css(textOn(rgb), 0.9);
-        ctx.fillText(text, from + wide / 2, row.y + row.height / 2 + 0.5);
-      }
+    for (const place of laid.strips) {
+      const lit = probe?.strip === place.strip ? probe.row : null;
+      paintNames(side, data.strips[place.strip], place, gutterWidth - 8, theme, lit);
     }
-    ctx.globalAlpha = 1;
-  }
-
-  // The code's colour, paler the less sure the generator was.
-  cellColour(level, position) {
-    const rgb = [0, 1, 2].map((i) => level.rgb[3 * position + i]);
-    return level.entropy ? mix(rgb, this.theme.surface, 0.85 * doubtOf(level, position)) : rgb;
+    this.named = JSON.stringify(probe && [probe.strip, probe.row]);
   }
 
   // Called at every frame: the playhead is an element, the canvas is drawn again only when other cells are under it.
@@ -137,85 +148,70 @@ export class Score {
 
   drawCells() {
     if (!this.ready()) return;
-    const ctx = clear(this.moving, this.ratio), { theme, data } = this, { state } = this.store;
-    if (state.span) this.band(ctx, state.span, css(theme.focus, 0.14));
-    if (state.hover) this.band(ctx, this.spanOf(state.hover), css(theme.text, 0.1));
-    for (const row of this.laid.rows) {
-      const track = data.tracks[row.track], position = tokenAt(track, row.level, state.frame);
-      if (position < 0 || !track.levels[row.level].ids) continue;
-      this.ring(ctx, { ...row, position }, css(theme.surface, 0.9), 3);
-      this.ring(ctx, { ...row, position }, css(theme.ink), 1.75);
-    }
-    this.drawSelection(ctx);
-    if (state.hover) this.ring(ctx, state.hover, css(theme.text), 2);
+    const { probe } = this.store.state;
+    paintLight(clear(this.moving, this.ratio), this);
+    if (this.data.strips.length && this.named !== JSON.stringify(probe && [probe.strip, probe.row])) this.drawGutter();
   }
 
-  // The chosen token, and thinly every place where the same code stands in its scale.
-  drawSelection(ctx) {
-    const chosen = locate(this.data.tracks, this.store.state.selection);
-    if (!chosen) return;
-    const level = this.data.tracks[chosen.track].levels[chosen.level], { focus } = this.theme;
-    this.band(ctx, this.spanOf(chosen), css(focus, 0.14));
-    for (let position = 0; level.ids && position < level.size; position++) {
-      const same = level.ids[position] === level.ids[chosen.position];
-      if (same && position !== chosen.position) this.ring(ctx, { ...chosen, position }, css(focus), 1.5);
-    }
-    this.ring(ctx, chosen, css(focus), 3);
-  }
-
-  spanOf({ track, level, position }) {
-    return spanOf(this.data.tracks[track], level, position);
-  }
-
-  // Lights up a stretch of time in all rows.
-  band(ctx, [from, to], color) {
-    const scale = this.width / this.data.frames;
-    ctx.fillStyle = color;
-    for (const row of this.laid.rows) ctx.fillRect(from * scale, row.y, (to - from) * scale, row.height);
-  }
-
-  ring(ctx, { track, level, position }, color, line) {
-    const row = this.laid.rows.find((candidate) => candidate.track === track && candidate.level === level);
-    const [from, to] = cellEdges(this.data.tracks[track], level, position, this.data.frames, this.width);
-    ctx.strokeStyle = color;
-    ctx.lineWidth = line;
-    ctx.beginPath();
-    ctx.roundRect(from, row.y + 1, Math.max(2, to - from - 1), row.height - 2, 2);
-    ctx.stroke();
-  }
-
-  cellOf(event) {
-    const box = this.roll.getBoundingClientRect(), { data, laid, width } = this;
-    const x = event.clientX - box.left, y = event.clientY - box.top;
-    return data && cellAt(data.tracks, laid.rows, x, y, data.frames, width);
+  // What is under a pointer: {hover, probe}, one of them or neither.
+  at(event) {
+    const { data, laid, width } = this;
+    if (!data) return { hover: null, probe: null };
+    const box = this.roll.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
+    const hover = cellAt(data.tracks, laid.rows, x, y, data.frames, width);
+    return { hover, probe: hover ? null : probeAt(data.strips, laid.strips, x, y, data.frames, width) };
   }
 
   listen() {
     const { roll, store } = this;
-    const hover = (cell, event) => {
-      store.set({ hover: cell });
-      this.showTip(cell, event);
-    };
     this.scroller.addEventListener("scroll", () => this.tellView());
-    roll.addEventListener("pointermove", (event) => event.pointerType !== "touch" && hover(this.cellOf(event), event));
-    roll.addEventListener("pointerleave", () => hover(null));
+    roll.addEventListener("pointermove", (event) => {
+      if (event.pointerType === "touch") return;
+      const found = this.at(event);
+      store.set(found);
+      this.showTip(this.linesOf(found), event.clientX + 14, event.clientY + 18);
+    });
+    roll.addEventListener("pointerleave", () => {
+      store.set({ hover: null, probe: null });
+      this.showTip(null);
+    });
     roll.addEventListener("click", (event) => {
-      const cell = this.cellOf(event);
-      if (!cell || !this.data.tracks[cell.track].levels[cell.level].ids) return;
-      const selection = { system: this.data.tracks[cell.track].system, scale: cell.level + 1, position: cell.position };
-      const again = JSON.stringify(locate(this.data.tracks, store.state.selection)) === JSON.stringify(cell);
-      store.commit("select", { selection: again ? null : selection });
+      const { hover, probe } = this.at(event);
+      if (hover) this.select(hover);
+      if (probe) store.seek(probe.frame);
+      if (probe && event.pointerType === "touch") this.touch(probe, event);
     });
   }
 
-  showTip(cell, event) {
-    if (!cell) return void (this.tip.hidden = true);
-    const lines = describeCell(this.data.tracks, cell, this.data.fps);
-    const content = lines.map((line) => el("div", {}, ...line.map((text) => el("span", { text }))));
-    this.placeTip(event.clientX + 14, event.clientY + 18, content);
+  // A finger cannot hover: what it taps in a heat map is told until the next tap.
+  touch(probe, event) {
+    this.store.set({ probe });
+    this.showTip(this.linesOf({ probe }), event.clientX + 14, event.clientY + 18);
   }
 
-  // x, y: in the window.
+  linesOf({ hover, probe }) {
+    const { tracks, strips, fps } = this.data;
+    return hover ? describeCell(tracks, hover, fps) : probe && describeProbe(strips, probe, fps);
+  }
+
+  isChosen(cell) {
+    return JSON.stringify(locate(this.data.tracks, this.store.state.selection)) === JSON.stringify(cell);
+  }
+
+  // Chooses a token, or lets go of it where it is chosen already. One that is still to come cannot be chosen.
+  select(cell) {
+    const track = this.data.tracks[cell.track];
+    if (!track.levels[cell.level].ids) return;
+    const selection = { system: track.system, scale: cell.level + 1, position: cell.position };
+    this.store.commit("select", { selection: this.isChosen(cell) ? null : selection });
+  }
+
+  // lines: pairs of words, or null to hide it; x, y: in the window.
+  showTip(lines, x, y) {
+    if (!lines) return void (this.tip.hidden = true);
+    this.placeTip(x, y, lines.map((line) => el("div", {}, ...line.map((text) => el("span", { text })))));
+  }
+
   placeTip(x, y, content) {
     const { tip } = this, box = this.element.getBoundingClientRect();
     tip.hidden = false;
@@ -224,53 +220,15 @@ export class Score {
     tip.style.transform = `translate(${left}px, ${y - box.top}px)`;
   }
 
-  head(track, y) {
-    const node = head(track, y), note = node.querySelector(".ms-note");
+  // A head whose note, where it is cut off, is told whole on hover and focus.
+  noted(head, { note: text }) {
+    const note = head.querySelector(".ms-note");
     const show = () => {
       const box = note.getBoundingClientRect();
-      this.placeTip(box.left, box.bottom + 4, [el("p", { text: track.note })]);
+      this.placeTip(box.left, box.bottom + 4, [el("p", { text })]);
     };
     for (const event of ["pointerenter", "focus"]) note?.addEventListener(event, show);
     for (const event of ["pointerleave", "blur"]) note?.addEventListener(event, () => (this.tip.hidden = true));
-    return node;
+    return head;
   }
-}
-
-function head(track, y) {
-  const scales = track.levels.length, there = track.levels.filter((level) => level.ids);
-  const tokens = there.reduce((sum, level) => sum + level.size, 0);
-  const so = there.length < scales ? `${there.length} of ${scales}` : scales;
-  const node = el(
-    "div", { class: "ms-head", style: `top:${y}px` },
-    el("i", { class: "ms-swatch" }),
-    el("strong", { text: track.name }),
-    el("span", { text: `${tokens} tokens in ${so} ${scales === 1 ? "scale" : "scales"}` }),
-  );
-  if (track.levels.some((level) => level.entropy)) node.append(el("span", { text: "faint: unsure" }));
-  if (track.note) node.append(el("span", { class: "ms-note", text: track.note, tabindex: "0" }));
-  return node;
-}
-
-function summary(tracks) {
-  const told = tracks.map((track) => `${track.name}: ${track.levels.map((level) => level.size).join(", ")} tokens`);
-  return `Tokens, coarse scales on top. ${told.join(". ")}.`;
-}
-
-// 0 sure, 1 as unsure as can be.
-function doubtOf(level, position) {
-  return Math.min(1, Math.max(0, level.entropy[position]) / Math.log(Math.max(2, level.codes)));
-}
-
-function drawPending(ctx, [x, y, w, h], theme) {
-  ctx.strokeStyle = css(theme.line);
-  ctx.lineWidth = 1;
-  ctx.strokeRect(x + 0.5, y + 0.5, Math.max(0, w - 1), h - 1);
-}
-
-// Wide cells have soft corners.
-function fillCell(ctx, [x, y, w, h]) {
-  if (w < 8) return ctx.fillRect(x, y, w, h);
-  ctx.beginPath();
-  ctx.roundRect(x, y, w, h, 2);
-  ctx.fill();
 }

@@ -1,4 +1,4 @@
-// One mounted stage: its parts, its states, what is drawn when, and what others may call.
+// One mounted stage: its parts, its states, and what is drawn when. What others may call is in remote.js.
 
 import { createCamera } from "./camera.js";
 import { readTheme } from "./colour.js";
@@ -7,22 +7,29 @@ import { el } from "./dom.js";
 import { Figures } from "./figures.js";
 import { addGestures } from "./gestures.js";
 import { listenToKeys } from "./keys.js";
+import { watchState } from "./links.js";
 import { Notices } from "./notices.js";
+import { Pace } from "./pace.js";
+import { Remote } from "./remote.js";
 import { describeCell } from "./rows.js";
-import { GUTTER, MARGIN, Score } from "./score.js";
+import { MARGIN, Score } from "./score.js";
 import { COMMITS, createStore, locate } from "./store.js";
+import { watchSurroundings } from "./surroundings.js";
 import { Timeline } from "./timeline.js";
 import { Toolbar } from "./toolbar.js";
 
 const UNREADABLE = "This result cannot be shown: it is not readable.";
-const SLOW = 0.036; // seconds a frame: where drawing takes longer, the figures get one pixel a CSS pixel
+const PHONE = 520; // CSS pixels: in a narrower picture two rows of figures get more height
+const TALLER = 1.4;
 
-export class Stage {
+export class Stage extends Remote {
   constructor(element, options) {
+    super();
     this.options = { height: 320, ...options };
     this.store = createStore();
     this.camera = createCamera();
     this.data = null;
+    this.pace = new Pace();
     this.dirty = { layout: true, theme: true, still: true, cells: true, figures: true };
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.build(element);
@@ -62,15 +69,13 @@ export class Stage {
         onCamera: () => this.redraw("figures"),
       }),
     ];
-    this.watchSize = new ResizeObserver(() => this.redraw("layout"));
-    for (const part of [this.picture, this.scorePart]) this.watchSize.observe(part);
-    this.watchTheme = new MutationObserver(() => this.redraw("theme"));
-    for (const node of [document.documentElement, document.body]) {
-      this.watchTheme.observe(node, { attributes: true, attributeFilter: ["class", "data-theme"] });
-    }
-    this.onScreen = () => this.redraw("theme", "layout");
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", this.onScreen);
-    window.addEventListener("resize", this.onScreen); // also fires when the pixel ratio changes
+    this.forget.push(
+      watchSurroundings([this.picture, this.scorePart], {
+        onSize: () => this.redraw("layout"),
+        onTheme: () => this.redraw("theme"),
+      }),
+      watchState(store, () => Boolean(this.timeline.drag), (state) => store.emit("state", state)),
+    );
   }
 
   // payload: object, JSON text, or null for the empty state. A message payload keeps the last result.
@@ -90,7 +95,7 @@ export class Stage {
 
   clear(text = "") {
     this.data = null;
-    this.store.set({ playing: false, selection: null, span: null, hover: null });
+    this.store.set({ playing: false, selection: null, span: null, hover: null, probe: null });
     this.figures.clear();
     this.toolbar.fitTo(null);
     this.notices.showBadge(null);
@@ -101,12 +106,13 @@ export class Stage {
   show(data) {
     const first = !this.scene;
     const scene = [data.frames, ...data.figures.map((figure) => figure.id)].join();
-    const patch = { frames: data.frames, fps: data.fps, hover: null };
+    const patch = { frames: data.frames, fps: data.fps, hover: null, probe: null };
     if (data.features) patch.guidance = data.features.guidance;
     // The same scene told again (a re-decode, one more scale) goes on where it was; another one starts anew.
     if (scene !== this.scene) Object.assign(patch, { frame: 0, selection: null, span: null });
     this.scene = scene;
     this.store.set(patch);
+    if (this.wished) this.setState(this.wished);
     this.figures.setData(data);
     this.score.setData(data);
     this.toolbar.fitTo(data);
@@ -131,8 +137,9 @@ export class Stage {
     if (has("guidance") && this.data) this.figures.setGuidance(this.store.state.guidance);
     if (has("selection")) this.speak();
     if (has("layout", "follow")) this.redraw("layout");
+    if (has("playing") && !this.store.state.playing && this.pace.step) this.drawWhole();
     if (has("scale", "scaleMode")) this.redraw("still");
-    if (has("hover", "span", "selection")) this.redraw("cells", "figures");
+    if (has("hover", "span", "selection", "probe", "peek")) this.redraw("cells", "figures");
     if (has("frame", "playing", "guidance", "trail", "ghost")) this.redraw("figures");
     this.toolbar.show(changed);
   }
@@ -165,11 +172,13 @@ export class Stage {
 
   advance(passed) {
     this.store.advance(Math.min(0.1, passed));
-    this.pace = 0.92 * (this.pace ?? 0) + 0.08 * Math.min(0.1, passed);
-    if (this.pace > SLOW && !this.coarse && window.devicePixelRatio > 1) {
-      this.coarse = true;
-      this.dirty.layout = true;
-    }
+    if (this.pace.watch(passed)) this.dirty.layout = true;
+  }
+
+  // A picture that stands still is drawn with all it has.
+  drawWhole() {
+    this.pace.restart();
+    this.redraw("layout");
   }
 
   drawCells() {
@@ -195,11 +204,14 @@ export class Stage {
   }
 
   layOut() {
-    const ratio = window.devicePixelRatio || 1;
-    const wide = this.scorePart.clientWidth, tracks = this.data && this.data.tracks.length > 0;
+    const ratio = window.devicePixelRatio || 1, { figures, picture, options } = this;
+    const wide = this.scorePart.clientWidth, scored = this.data && !this.score.element.hidden;
     if (this.data) this.score.resize(wide, ratio);
-    this.timeline.resize(wide, tracks ? GUTTER : 10, MARGIN, ratio);
-    this.figures.resize(this.picture.clientWidth, this.picture.clientHeight, this.coarse ? 1 : ratio);
+    this.timeline.resize(wide, scored ? this.score.gutterWidth : 10, MARGIN, ratio);
+    const crowd = picture.clientWidth < PHONE && figures.plan(picture.clientWidth, options.height).rows > 1;
+    picture.style.height = `${Math.round(options.height * (crowd ? TALLER : 1))}px`;
+    figures.plain = this.pace.plain;
+    figures.resize(picture.clientWidth, picture.clientHeight, this.pace.ratio(ratio));
     if (this.data) this.figures.fit();
     Object.assign(this.dirty, { still: true, cells: true, figures: true });
   }
@@ -219,70 +231,8 @@ export class Stage {
     this.redraw("layout");
   }
 
-  // The rest of what others may call; setPayload and say belong to it too.
-  busy(text = "Working") {
-    this.say("loading", text);
-  }
-
-  fail(text) {
-    this.say("error", text);
-  }
-
-  setGuidance(g) {
-    if (Number.isFinite(Number(g))) this.store.set({ guidance: Number(g) });
-  }
-
-  // mode: "focus" marks a scale, "upto" | "only" | "without" say which scales the decode shown used. null: all.
-  setScale(scale, mode = "focus") {
-    this.store.set({ scale: scale || null, scaleMode: mode });
-  }
-
-  play(playing = true) {
-    this.store.set({ playing });
-  }
-
-  pause() {
-    this.play(false);
-  }
-
-  seek(frame) {
-    this.store.seek(Number(frame));
-  }
-
-  select(selection) {
-    this.store.set({ selection: selection || null });
-  }
-
-  selectSpan(span) {
-    this.store.set({ span: span || null });
-  }
-
-  setSpanMode(on) {
-    this.timeline.spanMode = Boolean(on);
-  }
-
-  // event: "select", "span", "scale" (on commit), "change" (any value of the state), "frame" (each drawn frame).
-  on(event, listener) {
-    if (event !== "frame") return this.store.on(event, listener);
-    (this.frameListeners ??= new Set()).add(listener);
-    return () => this.frameListeners.delete(listener);
-  }
-
-  get state() {
-    return { ...this.store.state };
-  }
-
-  // Joints of a figure as they are drawn now, Float32Array [F * J * 3].
-  joints(id) {
-    return this.figures.figures.find((figure) => figure.block.id === id)?.joints;
-  }
-
   destroy() {
     this.forget.forEach((forget) => forget());
-    this.watchSize.disconnect();
-    this.watchTheme.disconnect();
-    window.removeEventListener("resize", this.onScreen);
-    matchMedia("(prefers-color-scheme: dark)").removeEventListener("change", this.onScreen);
     cancelAnimationFrame(this.pending);
     this.element.remove();
     this.scorePart.remove();

@@ -15,7 +15,9 @@ const DEFAULTS = {
   scaleMode: "focus", // "focus" | "upto" | "only" | "without": which rows the decode used, relative to `scale`
   selection: null, // {system, scale, position}: scale 1-based, position 0-based
   span: null, // [start, stop] in frames, stop not included
-  hover: null, // {track, level, position} under the pointer
+  hover: null, // {track, level, position} under the pointer or the keyboard's cursor
+  probe: null, // {strip, row, frame} likewise, of a heat map
+  peek: null, // frame under the pointer on the time axis
   guidance: 0,
 };
 
@@ -91,6 +93,24 @@ export function shareOf(track, level, position) {
 export function spanOf(track, level, position) {
   const spans = track.levels[level].spans;
   return spans ? [spans[2 * position], spans[2 * position + 1]] : shareOf(track, level, position);
+}
+
+// Positions [first, last + 1] of a level whose tokens govern some of the frames [from, to], or null.
+export function governing(track, level, [from, to]) {
+  let first = -1, last = -1;
+  for (let position = 0; position < track.levels[level].size; position++) {
+    const [start, stop] = spanOf(track, level, position);
+    if (start >= to - 1e-6 || stop <= from + 1e-6) continue;
+    if (first < 0) first = position;
+    last = position;
+  }
+  return first < 0 ? null : [first, last + 1];
+}
+
+// The token that lights up: the one pointed at, else the chosen one; with the frames that it governs.
+export function litToken(tracks, state) {
+  const cell = state.hover || locate(tracks, state.selection);
+  return cell && { cell, span: spanOf(tracks[cell.track], cell.level, cell.position), chosen: !state.hover };
 }
 
 // {system, scale, position} -> {track, level, position}, or null where these tracks have no such token.

@@ -1,23 +1,32 @@
 // The time axis: ruler, playhead, span. Dragging scrubs; dragging with alt (or in span mode) chooses a span.
 
+import { Brush } from "./brush.js";
+import { paintHatch } from "./cells.js";
 import { clear, el, seconds, sizeCanvas } from "./dom.js";
 import { css } from "./colour.js";
-import { spanOf } from "./store.js";
+import { litToken } from "./store.js";
 
 const HEIGHT = 30; // CSS pixels
 const BAR = HEIGHT - 9; // top of the bar
+const THICK = 4; // pixels of the bar; more where frames are hatched
+const KNOB = 10; // pixels on either side that take hold of the playhead in span mode
 
 export class Timeline {
   constructor(store, getData) {
     Object.assign(this, { store, getData, width: 0, left: 0, right: 0, ratio: 1 });
-    Object.assign(this, { theme: null, view: null, spanMode: false });
+    Object.assign(this, { theme: null, view: null, spanMode: false, drag: null });
     this.canvas = el("canvas", { "aria-hidden": "true" });
     this.elapsed = el("i", { class: "ms-elapsed" });
     this.knob = el("i", { class: "ms-knob" });
-    this.element = el("div", {
-      class: "ms-ruler", role: "slider", tabindex: "0", "aria-label": "Time", "aria-valuemin": "0",
+    this.peek = el("i", { class: "ms-peek", hidden: true });
+    this.slider = el("div", {
+      class: "ms-time-slider", role: "slider", tabindex: "0", "aria-label": "Time", "aria-valuemin": "0",
       title: "Drag to scrub, alt+drag to choose a span",
-    }, this.canvas, this.elapsed, this.knob);
+    });
+    const parts = [this.canvas, this.elapsed, this.slider];
+    this.element = el("div", { class: "ms-ruler" }, ...parts);
+    this.brush = new Brush(this);
+    this.element.append(this.knob, this.peek);
     this.listen();
   }
 
@@ -33,6 +42,14 @@ export class Timeline {
   resize(width, left, right, ratio) {
     Object.assign(this, { width, left, right, ratio });
     sizeCanvas(this.canvas, width, HEIGHT, ratio);
+    this.brush.show();
+  }
+
+  // In span mode a plain drag draws a span, and the playhead is dragged by its knob.
+  setSpanMode(on) {
+    this.spanMode = Boolean(on);
+    this.element.classList.toggle("is-spanning", this.spanMode);
+    this.slider.title = on ? "Drag to choose a span; drag the dot to scrub" : "Drag to scrub, alt+drag to choose a span";
   }
 
   // What moves at every frame is two elements, so that the canvas stands still.
@@ -44,24 +61,31 @@ export class Timeline {
   }
 
   draw() {
-    const { theme, width, left, right } = this, { state } = this.store;
+    const { theme, width, left, right } = this, { state } = this.store, data = this.getData();
     if (!theme || width < 2) return;
     const ctx = clear(this.canvas, this.ratio);
     this.drawRuler(ctx);
     ctx.fillStyle = css(theme.line);
-    rounded(ctx, left, BAR, width - left - right, 4);
-    if (state.hover) {
-      const track = this.getData().tracks[state.hover.track];
-      const [from, to] = spanOf(track, state.hover.level, state.hover.position);
-      ctx.fillStyle = css(theme.text, 0.35);
-      rounded(ctx, this.xOf(from), BAR - 2, Math.max(2, this.xOf(to) - this.xOf(from)), 8);
+    rounded(ctx, left, BAR, width - left - right, THICK);
+    for (const [from, to] of data?.hatch || []) {
+      const [x, end] = [this.xOf(from), this.xOf(to)];
+      ctx.fillStyle = css(theme.line);
+      ctx.fillRect(x, BAR - 3, end - x, THICK + 6);
+      paintHatch(ctx, x, BAR - 3, end - x, THICK + 6, css(theme.lineStrong), 5);
     }
-    if (state.span) this.drawSpan(ctx, state.span);
+    const lit = data && litToken(data.tracks, state);
+    if (lit) {
+      const [from, to] = lit.span.map((frame) => this.xOf(frame));
+      ctx.fillStyle = lit.chosen ? css(theme.focus) : css(theme.text, 0.45);
+      rounded(ctx, from, BAR - 2, Math.max(2, to - from), THICK + 4);
+    }
     if (this.view) {
       const [from, to] = this.view.map((frame) => this.xOf(frame));
       ctx.strokeStyle = css(theme.lineStrong);
-      ctx.strokeRect(from + 0.5, BAR - 5.5, to - from - 1, 14);
+      ctx.strokeRect(from + 0.5, BAR - 5.5, to - from - 1, THICK + 10);
     }
+    this.brush.show();
+    this.drawPeek(state.peek);
   }
 
   drawRuler(ctx) {
@@ -79,13 +103,13 @@ export class Timeline {
     }
   }
 
-  drawSpan(ctx, span) {
-    const [from, to] = span.map((frame) => this.xOf(frame));
-    ctx.fillStyle = css(this.theme.focus, 0.3);
-    ctx.fillRect(from, BAR - 4, to - from, 12);
-    ctx.fillStyle = css(this.theme.focus);
-    ctx.fillRect(from - 1, BAR - 6, 2, 16);
-    ctx.fillRect(to - 1, BAR - 6, 2, 16);
+  // The moment under the pointer, told over the ruler.
+  drawPeek(frame) {
+    this.peek.hidden = frame === null;
+    if (frame === null) return;
+    this.peek.textContent = `${(frame / this.store.state.fps).toFixed(2)} s`;
+    const x = Math.min(Math.max(this.xOf(frame), 26), this.width - 26);
+    this.peek.style.transform = `translateX(${x.toFixed(1)}px) translateX(-50%)`;
   }
 
   // The values that screen readers tell; not at every drawn frame while it plays, or they would never stop talking.
@@ -94,39 +118,52 @@ export class Timeline {
     const now = seconds(Math.floor(state.frame + 1e-6), state.fps), total = seconds(state.frames, state.fps);
     if (this.told === now + total) return;
     this.told = now + total;
-    this.element.setAttribute("aria-valuemax", total);
-    this.element.setAttribute("aria-valuenow", now);
-    this.element.setAttribute("aria-valuetext", `${now} of ${total} seconds`);
+    this.slider.setAttribute("aria-valuemax", total);
+    this.slider.setAttribute("aria-valuenow", now);
+    this.slider.setAttribute("aria-valuetext", `${now} of ${total} seconds`);
   }
 
   listen() {
-    const { element, store } = this;
-    let drag = null;
-    element.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0 || store.state.frames < 2) return;
-      event.preventDefault();
-      element.setPointerCapture(event.pointerId);
-      element.focus({ preventScroll: true });
-      drag = { from: this.frameAt(event), span: event.altKey || this.spanMode, playing: store.state.playing };
-      store.set({ playing: false });
-      if (!drag.span) store.seek(drag.from);
-    });
-    element.addEventListener("pointermove", (event) => {
-      if (!drag) return;
-      if (drag.span) store.set({ span: spanBetween(drag.from, this.frameAt(event), store.state.frames) });
-      else store.seek(this.frameAt(event));
-    });
-    const end = (event) => {
-      if (!drag) return;
-      const { span, from, playing } = drag;
-      drag = null;
-      const { state } = store, released = event.type === "pointerup";
-      const chosen = released ? spanBetween(from, this.frameAt(event), state.frames) : state.span;
-      if (span) store.commit("span", { span: chosen });
-      store.set({ playing });
-    };
-    element.addEventListener("pointerup", end);
-    element.addEventListener("pointercancel", end);
+    const { element } = this;
+    element.addEventListener("pointerdown", (event) => this.begin(event));
+    element.addEventListener("pointermove", (event) => this.follow(event));
+    element.addEventListener("pointerup", (event) => this.end(event));
+    element.addEventListener("pointercancel", (event) => this.end(event));
+    element.addEventListener("pointerleave", () => this.store.set({ peek: null }));
+  }
+
+  begin(event) {
+    const { store, element, brush } = this;
+    if (event.button !== 0 || store.state.frames < 2) return;
+    event.preventDefault();
+    element.setPointerCapture(event.pointerId);
+    const at = this.frameAt(event), part = brush.partAt(event), edge = part === "start" || part === "end";
+    const onKnob = Math.abs(this.xOf(at) - this.xOf(store.state.frame)) <= KNOB;
+    const spanning = edge || event.altKey || (this.spanMode && !onKnob);
+    this.drag = { spanning, playing: store.state.playing };
+    store.set({ playing: false, peek: null });
+    (edge ? brush.handles[part === "end" ? 1 : 0] : this.slider).focus({ preventScroll: true });
+    if (spanning) brush.take(edge || (part && !event.altKey) ? part : null, at);
+    else store.seek(at);
+  }
+
+  follow(event) {
+    const { store, drag } = this, at = this.frameAt(event);
+    if (drag) return drag.spanning ? this.brush.drawTo(at) : store.seek(at);
+    const inside = at >= 0 && at < store.state.frames && event.pointerType !== "touch";
+    store.set({ peek: inside ? at : null });
+  }
+
+  end(event) {
+    const { drag, store } = this;
+    if (!drag) return;
+    this.drag = null;
+    const at = this.frameAt(event), still = drag.spanning && !event.altKey && this.brush.isStill(at);
+    if (drag.spanning && event.type === "pointerup") this.brush.drawTo(at);
+    if (still) this.brush.undo();
+    if (drag.spanning) this.brush.release(!still);
+    if (still) store.seek(at); // a mere click in span mode
+    store.set({ playing: drag.playing });
   }
 }
 
@@ -135,10 +172,4 @@ function rounded(ctx, x, y, w, h) {
   ctx.beginPath();
   ctx.roundRect(x, y, w, h, 2);
   ctx.fill();
-}
-
-// Whole frames [start, stop] of a drag; null when it is shorter than a frame: a mere click clears the span.
-function spanBetween(a, b, frames) {
-  const start = Math.max(0, Math.floor(Math.min(a, b))), stop = Math.min(frames, Math.ceil(Math.max(a, b)));
-  return Math.abs(a - b) < 1 || stop <= start ? null : [start, stop];
 }

@@ -24,6 +24,7 @@ export class Toolbar {
     next.append(icon("next"));
     this.now = el("span", { class: "ms-now" });
     this.total = el("span", { class: "ms-total" });
+    this.count = el("span", { class: "ms-total ms-count", title: "Frame of the motion" });
     this.speeds = SPEEDS.map((speed) =>
       button(`${speed}×`, `Play at ${speed} times the speed`, () => store.set({ speed })));
     this.toggles = Object.fromEntries(Object.entries(TOGGLES).map(([key, [text, title]]) =>
@@ -33,7 +34,7 @@ export class Toolbar {
     this.element = el(
       "div", { class: "ms-toolbar", role: "group", "aria-label": "Playback" },
       el("div", { class: "ms-group" }, back, this.play, next),
-      el("div", { class: "ms-time" }, this.now, this.total),
+      el("div", { class: "ms-time" }, this.now, this.total, this.count),
       el("div", { class: "ms-group", role: "group", "aria-label": "Speed" }, ...this.speeds),
       el("div", { class: "ms-group ms-toggles" }, ...Object.values(this.toggles), this.overlay, this.reset),
     );
@@ -57,6 +58,7 @@ export class Toolbar {
     if (has("frame", "frames", "fps")) {
       this.now.textContent = seconds(Math.floor(state.frame + 1e-6), state.fps);
       this.total.textContent = ` / ${seconds(state.frames, state.fps)} s`;
+      this.count.textContent = `frame ${Math.floor(state.frame + 1e-6)}`;
     }
   }
 
