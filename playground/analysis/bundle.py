@@ -1,112 +1,27 @@
-"""Stored analysis of one system, read by rooms and notebooks: maps, code counts, tokens of test clips. numpy only.
+"""The stored analysis of a system with what is computed from it: code usage, residual energy. numpy only.
 
-Two files a system, in `assets/analysis/` where it is shipped:
-
-    <system>.json   {"format": 1, "system", "checkpoint", "data", "split", "seed", "perplexity", "explained": [2],
-                     "agreement", "chance", "sizes": [N], "codes": [N], "versions": {...}, "note",
-                     "clips": [{"id", "index", "source", "action", "caption", "frames"}, ...]}
-    <system>.npz    means float32 [n, D], tsne float32 [n, 2], pca float32 [n, 2], tokens int16 [n, sum of sizes],
-                    counts int32 [sum of codes], energy float32 [n, N + 1], errors_mm float32 [n]
-
-Row i of every array is entry i of "clips". The recorded motions are not in it: a click decodes the token sequence of a
-clip on the fly. `caption` is a sentence written for this project (`phrases.py`), not one of the data set.
+What is kept and how is described in `playground/stored.py`.
 """
 
-import json
-import zipfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from playground.analysis.residual import ScaleEnergy
 from playground.analysis.usage import CodeUsage
-from playground.errors import PlaygroundError
-from playground.tokenizers.token_file import LevelTokens, TokenFile
+from playground.stored import StoredAnalysis, StoredClip
 
-FORMAT = 1
 DECODED_NOTE = "a token sequence of a test clip, decoded on the fly"
-_FACTS = ("system", "checkpoint", "data", "split", "seed", "perplexity", "explained", "agreement", "chance", "sizes",
-          "codes", "versions", "note")  # fmt: skip
-_ARRAYS = ("means", "tsne", "pca", "tokens", "counts", "energy", "errors_mm")
-
-Floats = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class BundleClip:
-    """One clip of a bundle."""
-
-    id: str
-    index: int  # clip of the library the bundle was built from
-    source: str
-    action: str  # action group
-    caption: str  # our sentence, which also guides the decoder
-    frames: int  # feature rows, and poses of the decoded motion
+BundleClip = StoredClip
 
 
 @dataclass(frozen=True, eq=False)
-class Bundle:
-    """Stored analysis of one system on n clips; every array has one row a clip but `counts`."""
-
-    system: str
-    checkpoint: str  # the tokenizer checkpoint the tokens belong to
-    data: str
-    split: str
-    seed: int
-    perplexity: float  # of t-SNE
-    explained: tuple[float, float]  # share of the variance along the PCA axes
-    agreement: float  # share of the 10 nearest neighbours of the same action, in all D dimensions
-    chance: float  # the same for shuffled actions
-    sizes: tuple[int, ...]  # tokens a scale
-    codes: tuple[int, ...]  # codebook size a scale
-    versions: dict[str, str]  # of the packages that computed it
-    note: str
-    clips: tuple[BundleClip, ...]
-    means: Floats  # [n, D]
-    tsne: Floats  # [n, 2]
-    pca: Floats  # [n, 2]
-    tokens: NDArray[np.int16]  # [n, sum of sizes]
-    counts: NDArray[np.int32]  # [sum of codes]
-    energy: Floats  # [n, N + 1]
-    errors_mm: Floats  # [n] mean error of each clip, caption of the data set at both ends, g = 0
-
-    def __post_init__(self) -> None:
-        n = len(self.clips)
-        shapes = {"tsne": (n, 2), "pca": (n, 2), "tokens": (n, sum(self.sizes)), "counts": (sum(self.codes),)}
-        shapes |= {"energy": (n, len(self.sizes) + 1), "errors_mm": (n,), "means": (n, *self.means.shape[1:2])}
-        for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
-                raise PlaygroundError(
-                    f"the stored analysis of {self.system} has {name} of another shape than {list(shape)}"
-                )
-        if not n or len(self.sizes) != len(self.codes):
-            raise PlaygroundError(f"the stored analysis of {self.system} has no clip, or scales without codes")
-
-    def __len__(self) -> int:
-        return len(self.clips)
-
-    @property
-    def actions(self) -> list[str]:
-        """Action group of every clip."""
-        return [clip.action for clip in self.clips]
-
-    @property
-    def ids(self) -> list[str]:
-        """Id of every clip: what a click on a map reports."""
-        return [clip.id for clip in self.clips]
-
-    @property
-    def provenance(self) -> str:
-        """One line for the caption of a figure."""
-        return (
-            f"{self.system}, checkpoint {self.checkpoint[:8]}, {len(self)} {self.split} clips of {self.data}, "
-            f"seed {self.seed}, stored"
-        )
+class Bundle(StoredAnalysis):
+    """Stored analysis of one system on n clips."""
 
     @cached_property
     def usage(self) -> CodeUsage:
@@ -118,58 +33,15 @@ class Bundle:
         """Residual energy by scale over all clips."""
         return ScaleEnergy().fit(self.energy)
 
-    def position(self, id: str) -> int:
-        """Row of a clip by its id; PlaygroundError if it is not there."""
-        for row, clip in enumerate(self.clips):
-            if clip.id == id:
-                return row
-        raise PlaygroundError(f"there is no clip {str(id)[:80]!r} in the stored analysis of {self.system}")
-
-    def levels(self, row: int) -> tuple[LevelTokens, ...]:
-        """Tokens of one clip, one entry a scale."""
-        parts = np.split(self.tokens[row].astype(np.int64), np.cumsum(self.sizes)[:-1])
-        return tuple(LevelTokens(len(ids), codes, ids) for ids, codes in zip(parts, self.codes, strict=True))
-
-    def token_file(self, row: int) -> TokenFile:
-        """One clip as a token file, for `engine.decode`; its caption is ours."""
-        clip = self.clips[row]
-        return TokenFile(self.system, self.checkpoint, clip.caption, clip.frames, self.levels(row))
-
-    def where_used(self, scale: int, code: int) -> list[tuple[int, int]]:
-        """(row, position) of every token of scale `scale` (0-based) that has the code."""
-        start = sum(self.sizes[:scale])
-        found = np.argwhere(self.tokens[:, start : start + self.sizes[scale]] == code)
-        return [(int(row), int(position)) for row, position in found]
-
 
 def write_bundle(folder: Path, bundle: Bundle) -> None:
     """Write both files of a bundle into `folder`, made if absent."""
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(folder / f"{bundle.system}.npz", **{name: getattr(bundle, name) for name in _ARRAYS})
-    head: dict[str, Any] = {"format": FORMAT} | {name: getattr(bundle, name) for name in _FACTS}
-    text = json.dumps(head | {"clips": [asdict(clip) for clip in bundle.clips]}, indent=1, ensure_ascii=False)
-    (folder / f"{bundle.system}.json").write_text(text + "\n", encoding="utf-8")
+    bundle.write(folder)
 
 
 def read_bundle(folder: Path, system: str) -> Bundle:
     """The stored analysis of a system. PlaygroundError if it is absent or broken."""
-    if not (folder / f"{system}.json").is_file():
-        raise PlaygroundError(
-            f"there is no stored analysis of {system}; `python -m playground.analysis.store` makes one"
-        )
-    try:
-        head = json.loads((folder / f"{system}.json").read_text(encoding="utf-8"))
-        if head["format"] != FORMAT:
-            raise PlaygroundError(f"the stored analysis of {system} has format {head['format']}; {FORMAT} is read")
-        with np.load(folder / f"{system}.npz", allow_pickle=False) as file:
-            arrays = {name: file[name] for name in _ARRAYS}
-        facts = {name: head[name] for name in _FACTS}
-        facts |= {name: tuple(facts[name]) for name in ("explained", "sizes", "codes")}
-        return Bundle(**facts, clips=tuple(BundleClip(**clip) for clip in head["clips"]), **arrays)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, PlaygroundError):
-            raise
-        raise PlaygroundError(f"the stored analysis of {system} is broken; build it again") from error
+    return Bundle.read(folder, system)
 
 
 def stored_systems(folder: Path) -> list[str]:

@@ -31,6 +31,8 @@ class EmbeddingMap:
         seed_        the seed used
         perplexity_  of t-SNE, min(30, (n - 1) / 3) and at least 1; nan for PCA
         explained_   float64 [2], share of the variance along the two axes; nan for t-SNE
+        centre_      float64 [D] and
+        axes_        float64 [2, D] of PCA, points_ = (embeddings - centre_) @ axes_.T; zeros for t-SNE
     """
 
     points_: NDArray[np.float64]
@@ -38,6 +40,8 @@ class EmbeddingMap:
     seed_: int
     perplexity_: float
     explained_: NDArray[np.float64]
+    centre_: NDArray[np.float64]
+    axes_: NDArray[np.float64]
 
     def __init__(self, perplexity: float = PERPLEXITY) -> None:
         self.perplexity = perplexity
@@ -59,6 +63,7 @@ class EmbeddingMap:
         self.method_, self.seed_ = method, seed
         self.perplexity_, self.explained_ = float("nan"), np.full(2, np.nan)
         self.points_ = np.zeros((len(rows), 2))
+        self.centre_, self.axes_ = rows.mean(axis=0), np.zeros((2, rows.shape[1]))
         if method == "tsne":
             self.perplexity_ = max(1.0, min(self.perplexity, (len(rows) - 1) / 3))
         size = float(np.abs(rows).max()) or 1.0  # the largest value becomes 1, so that no square overflows
@@ -70,25 +75,37 @@ class EmbeddingMap:
 
     def _pca(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scores [n, 2] on the two main axes; a second column of zeros where there is only one."""
-        points, self.explained_ = _main_axes(rows)
-        return points
+        main = main_axes(rows)
+        self.explained_, self.axes_ = main.explained, main.axes
+        return main.scores
 
     def _tsne(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """t-SNE of rows of which at least two differ; it starts from PCA with a spread of 1e-4 along the first axis."""
-        start = _main_axes(rows)[0]
+        start = main_axes(rows).scores
         start = (start / start[:, 0].std() * 1e-4).astype(np.float32)
         model = TSNE(perplexity=self.perplexity_, init=start, learning_rate="auto", random_state=self.seed_, n_jobs=1)
         return np.asarray(model.fit_transform(rows), np.float64)
 
 
-def _main_axes(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """PCA of rows [n, D]: scores [n, 2] and shares of the variance [2], zeros for an axis that is not there."""
-    kept = min(2, *rows.shape)
+@dataclass(frozen=True, eq=False)
+class MainAxes:
+    """PCA of n vectors: scores = (rows - centre) @ axes.T."""
+
+    scores: NDArray[np.float64]  # [n, k]
+    explained: NDArray[np.float64]  # [k] share of the variance along each axis
+    centre: NDArray[np.float64]  # [D]
+    axes: NDArray[np.float64]  # [k, D]
+
+
+def main_axes(rows: NDArray[np.float64], count: int = 2) -> MainAxes:
+    """PCA of rows [n, D] along the `count` main axes; zeros for an axis that is not there."""
+    kept = min(count, *rows.shape)
     model = PCA(n_components=kept, svd_solver="full")
-    points, explained = np.zeros((len(rows), 2)), np.zeros(2)
-    points[:, :kept] = model.fit_transform(rows)
-    explained[:kept] = model.explained_variance_ratio_
-    return points, explained
+    scores, explained, axes = np.zeros((len(rows), count)), np.zeros(count), np.zeros((count, rows.shape[1]))
+    scores[:, :kept] = model.fit_transform(rows)
+    explained[:kept] = np.nan_to_num(model.explained_variance_ratio_)
+    axes[:kept] = model.components_
+    return MainAxes(scores, explained, model.mean_, axes)
 
 
 def neighbour_agreement(embeddings: ArrayLike, labels: Sequence[str], k: int = 10) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Builds the stored analysis of a system: `python -m playground.analysis.store --system NAME --library DIR --out DIR`.
 
 Tokenizes the clips of one split with their own captions (first one, at both ends, g = 0: the numbers of an evaluation)
-and keeps maps, counts and token ids. What is kept and how is described in bundle.py.
+and keeps maps of clips and of single tokens, counts and token ids. What is kept and how: `playground/stored.py`.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from playground.analysis.bundle import DECODED_NOTE, Bundle, BundleClip, counts_
 from playground.analysis.embedding import EmbeddingMap, neighbour_agreement
 from playground.analysis.passes import ClipPass, clip_passes, first_caption
 from playground.analysis.phrases import group_of, sentence
+from playground.analysis.tokenmap import map_tokens
 from playground.data.library import Library
 from playground.engine import ASSETS, Engine, default_engine
 from playground.errors import PlaygroundError
@@ -72,10 +73,13 @@ def build_bundle(
         means=means,
         tsne=tsne.points_.astype(np.float32),
         pca=pca.points_.astype(np.float32),
+        pca_centre=pca.centre_.astype(np.float32),
+        pca_axes=pca.axes_.astype(np.float32),
         tokens=np.concatenate(ids, axis=1).astype(np.int16),
         counts=counts_of(ids, codes),
         energy=np.stack([one.energy for one in passes]).astype(np.float32),
         errors_mm=np.array([one.errors_mm.mean() for one in passes], np.float32),
+        **vars(map_tokens(runtime, ids, seed)),
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from playground.analysis import examples as builder
 from playground.analysis import store
@@ -53,6 +54,24 @@ def test_counts_are_those_of_the_tokens(bundle: Bundle) -> None:
     assert len(bundle.where_used(2, code)) == bundle.usage.counts_[2][code]
 
 
+def test_axes_give_the_stored_places(bundle: Bundle) -> None:
+    np.testing.assert_allclose((bundle.means - bundle.pca_centre) @ bundle.pca_axes.T, bundle.pca, atol=1e-4)
+    np.testing.assert_allclose(bundle.pca_axes @ bundle.pca_axes.T, np.eye(2), atol=1e-5)
+
+
+def test_the_token_map_holds_what_tokens_add(place: tuple[Engine, Library], bundle: Bundle) -> None:
+    quantizer = place[0].runtime(SYSTEM).tokenizer.quantizer
+    assert {int(scale) for scale in bundle.token_index[:, 1]} == {1, 2, 3}
+    assert len(np.unique(bundle.token_index, axis=0)) == len(bundle.token_index)
+    for (row, scale, position), scores in zip(bundle.token_index[::7], bundle.token_scores[::7], strict=True):
+        level = bundle.levels(int(row))[scale - 1]
+        share = quantizer.share(scale - 1, torch.from_numpy(level.ids)[None])[0].numpy()
+        edges = [position * len(share) / level.size, (position + 1) * len(share) / level.size]  # whole numbers here
+        vector = share[int(edges[0]) : int(edges[1])].mean(axis=0)
+        expected = (vector - bundle.token_centre) @ bundle.token_axes.T
+        np.testing.assert_allclose(scores, expected, atol=2e-3 * float(np.abs(bundle.token_scores).max()))
+
+
 def test_a_click_decodes_the_clip(place: tuple[Engine, Library], bundle: Bundle) -> None:
     row = bundle.position("clip3")
     decoded = place[0].decode(bundle.token_file(row))
@@ -92,7 +111,9 @@ def test_unknown_clip_is_one_sentence(bundle: Bundle) -> None:
         bundle.position("nobody")
 
 
-@pytest.mark.parametrize("field", ["tsne", "tokens", "counts", "energy", "errors_mm"])
+@pytest.mark.parametrize(
+    "field", ["tsne", "tokens", "counts", "energy", "errors_mm", "pca_axes", "token_scores", "token_tsne"]
+)
 def test_arrays_that_do_not_fit_are_refused(bundle: Bundle, field: str) -> None:
     with pytest.raises(PlaygroundError, match=field):
         replace(bundle, **{field: getattr(bundle, field)[1:]})

@@ -59,7 +59,17 @@ def stored_analysis() -> Bundle:
         "lgtok-lite", "fake00000000", "made up", "test", 0, 30.0, (0.4, 0.2), 0.7, 0.33, SIZES, CODES, {}, "", clips,
         means, points.astype(np.float32), points[:, ::-1].astype(np.float32).copy(),
         np.concatenate(ids, axis=1).astype(np.int16), counts_of(ids, CODES), energy, np.full(90, 40.0, np.float32),
+        np.zeros(8, np.float32), np.eye(2, 8, dtype=np.float32), *_token_map(rng),
     )  # fmt: skip
+
+
+def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
+    """Index, centre, axes, scores and places of 200 tokens: 20 of every scale."""
+    scale = np.repeat(np.arange(1, len(SIZES) + 1), 20)
+    index = np.stack([rng.integers(0, 90, 200), scale, rng.integers(0, np.array(SIZES)[scale - 1])], axis=1)
+    scores = (rng.normal(size=(200, 3)) + scale[:, None] * [1.0, 0.5, 0.0]).astype(np.float16)
+    places = (scores[:, :2] * 4).astype(np.float32)
+    return index.astype(np.int32), np.zeros(8, np.float32), np.eye(3, 8, dtype=np.float32), scores, places
 
 
 class FakeEngine:
