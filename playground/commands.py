@@ -141,14 +141,14 @@ def train(
 
 def evaluate(system: str, library: Path, split: str, to: Path | None, **asked: Any) -> None:
     """Measure a system on a split; `asked` is the rest of evaluation.run.Order."""
-    _check_system(default_engine(), system)
-    if not Library.open(library).split(split):
-        raise PlaygroundError(f"the split {split} of {library} is empty")
     from playground.evaluation import run
     from playground.evaluation.spread import join_spread
 
     order = run.Order(**asked, out=to)
     order.check()
+    _check_system(default_engine(), system)
+    if not Library.open(library).split(split):
+        raise PlaygroundError(f"the split {split} of {library} is empty")
     spread = join_spread()
     with Progress(f"evaluating {system}") if spread.first else nullcontext() as progress:
         result = run.evaluate(system, library, split, progress, order=order, spread=spread)

@@ -162,8 +162,8 @@ def _absent(keys: Iterable[str], why: str) -> Table:
 def summarise(tables: Sequence[Table]) -> Table:
     """Repeats of one table -> {metric: {"mean", "ci95", "n"}}, with "why" where there is no mean, "note" as it was.
 
-    ci95 is 1.96 * std / sqrt(repeats), std with the number of repeats in the denominator (F2), null for one repeat; n
-    is the sample of one repeat. A metric without a value in one repeat has none at all.
+    ci95 is 1.96 * std / sqrt(repeats), std with the number of repeats in the denominator (F2): 0 for a single repeat,
+    which says nothing of the spread. n is the sample of one repeat. A metric that one repeat lacks has no mean.
     """
     out: Table = {}
     for key in [key for key in KEYS if key in tables[0]]:
@@ -173,7 +173,7 @@ def summarise(tables: Sequence[Table]) -> Table:
             out[key] = {"mean": None, "ci95": None, "n": 0, "why": missing["why"]}
             continue
         values = np.array([entry["value"] for entry in entries])
-        half = float(1.96 * values.std() / math.sqrt(len(values))) if len(values) > 1 else None
+        half = float(1.96 * values.std() / math.sqrt(len(values)))
         out[key] = {"mean": float(values.mean()), "ci95": half, "n": entries[0]["n"]}
         if "note" in entries[0]:
             out[key]["note"] = entries[0]["note"]
