@@ -15,6 +15,7 @@ from playground.limits import LIMITS
 from playground.motion.formats import read_motion, write_motion
 from playground.motion.motion import Motion
 from playground.progress import Progress
+from playground.systems import row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import TokenFile
 
@@ -215,7 +216,7 @@ def _check_system(engine: Engine, name: str, generator: bool = False) -> None:
     if name not in table:
         raise PlaygroundError(f"unknown system {name[:80]!r}; one of {', '.join(table)} is accepted")
     if table[name].checkpoint == "absent":
-        raise PlaygroundError(f"the system {name} has no checkpoint here; train one with the train command")
+        raise PlaygroundError(row_of(name).absent)
     if generator and table[name].generator is None:
         raise PlaygroundError(f"the system {name} has no generator; it can tokenize and decode only")
 

@@ -48,7 +48,7 @@ class DrawnScale:
 
 @dataclass(frozen=True, eq=False)
 class Runtime:
-    """Tokenizer, generator and text encoder of one system; stateless, safe to share between threads."""
+    """Tokenizer, generator and text encoders of one system; stateless, safe to share between threads."""
 
     name: str
     tokenizer: LGTok
@@ -57,10 +57,15 @@ class Runtime:
     normaliser: Normaliser
     checkpoint: str
     data: str
+    prompt_encoder: CachedEncoder | None = None  # of the generator, where it reads another one than the tokenizer
 
     def text(self, caption: str) -> TextFeatures | None:
         """Features of a caption; None for the empty one: no text at all."""
         return self.encoder.encode([caption]) if caption else None
+
+    def prompt(self, prompt: str) -> TextFeatures | None:
+        """Features of a prompt for the generator; None for the empty one."""
+        return (self.prompt_encoder or self.encoder).encode([prompt]) if prompt else None
 
     def codebooks(self) -> list[Floats]:
         """Code vectors [V, D] of every scale."""
@@ -106,17 +111,21 @@ class Runtime:
         """Draw one motion scale by scale. PlaygroundError if the system has no generator."""
         if self.generator is None:
             raise PlaygroundError(f"the system {self.name} has no generator; it can tokenize and decode only")
-        text = None if prompt is None else self.text(prompt)
+        text = None if prompt is None else self.prompt(prompt)
         for step in self.generator.steps(text, torch.tensor([frames]), Sampling(**sampling)):
             yield DrawnScale(step.level, level_tokens(step.tokens), step.entropy[0].numpy(), step.embedding)
 
     # ---- many at once, for evaluation -----------------------------------------------------------------------------
 
-    def texts(self, captions: Sequence[str]) -> TextFeatures | None:
-        """Features of the captions of one batch; None where all are empty. PlaygroundError if only some are."""
+    def texts(self, captions: Sequence[str], *, prompts: bool = False) -> TextFeatures | None:
+        """Features of the captions of one batch; None where all are empty. PlaygroundError if only some are.
+
+        prompts: for the generator, not for the tokenizer.
+        """
         if any(captions) != all(captions):
             raise PlaygroundError("a batch holds captions or none; some of these are empty")
-        return self.encoder.encode(captions).to(self.device) if any(captions) else None
+        encoder = (self.prompt_encoder if prompts else None) or self.encoder
+        return encoder.encode(captions).to(self.device) if any(captions) else None
 
     def generate_batch(
         self, captions: Sequence[str], frames: Sequence[int], seeds: Sequence[int], sampling: dict[str, Any]
@@ -128,7 +137,9 @@ class Runtime:
         if self.generator is None:
             raise PlaygroundError(f"the system {self.name} has no generator; it can tokenize and decode only")
         how = Sampling(**sampling, seeds=tuple(seeds))
-        return self.generator.generate(self.texts(captions), torch.tensor(frames, device=self.device), how)
+        return self.generator.generate(
+            self.texts(captions, prompts=True), torch.tensor(frames, device=self.device), how
+        )
 
     def decode_batch(
         self, embedding: Tensor, frames: Sequence[int], captions: Sequence[str], guidance: float
@@ -167,19 +178,23 @@ def load_runtime(assets: Path, row: SystemRow) -> Runtime:
     torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS") or os.cpu_count() or 1))
     path = checkpoint_path(assets, row.name, "tokenizer")
     if not path.is_file():
-        raise PlaygroundError(f"the system {row.name} has no checkpoint here; train one with the train command")
+        raise PlaygroundError(row.absent)
     tokenizer, card = load_tokenizer(path)
     if card.normaliser is None:
         raise PlaygroundError(f"{path} carries no normaliser; it is not a finished tokenizer checkpoint")
     encoder = load_encoder(row.text)
     check_same(card.encoder, encoder)
-    generator = None
+    generator, prompt_encoder = None, None
     generator_path = checkpoint_path(assets, row.name, "generator")
     if row.generator is not None and generator_path.is_file():
         network, generator_card = load_generator(generator_path)
-        check_same(generator_card.encoder, encoder)
+        prompt_encoder = load_encoder(row.prompts or row.text)
+        check_same(generator_card.encoder, prompt_encoder)
         drawn_from = generator_card.facts.get("tokenizer")
         if drawn_from is not None and drawn_from != card.hash[:12]:
             raise PlaygroundError(f"{generator_path} was trained on the tokens of another tokenizer; train it again")
         generator = ScalewiseGenerator(network, tokenizer.quantizer)
-    return Runtime(row.name, tokenizer, generator, CachedEncoder(encoder), card.normaliser, card.hash[:12], card.data)
+    captions, prompts = CachedEncoder(encoder), None
+    if prompt_encoder is not None and prompt_encoder is not encoder:
+        prompts = CachedEncoder(prompt_encoder)
+    return Runtime(row.name, tokenizer, generator, captions, card.normaliser, card.hash[:12], card.data, prompts)

@@ -37,8 +37,15 @@ class SystemRow:
     tokenizer: str | None  # what kind, in the words of its paper
     generator: str | None
     text: str = "minilm"  # text encoder of both
+    prompts: str = ""  # text encoder of the generator, where it is another
+    command: str = "train"  # the command that makes its files
     latents_are_frames: bool = False  # does a latent stand for a fixed span of frames by construction?
     sampling: SamplingDefaults = SamplingDefaults()
+
+    @property
+    def absent(self) -> str:
+        """The sentence for a person who asks for it where its files are not."""
+        return f"the system {self.name} has no checkpoint here; the {self.command} command makes one"
 
 
 SYSTEMS: dict[str, SystemRow] = {
@@ -51,6 +58,27 @@ SYSTEMS: dict[str, SystemRow] = {
             "LG-Tok transformer",
             "scale-wise autoregression",
             sampling=SamplingDefaults(guidance=0.0, cfg=3.0),  # chosen by the plain prompts that it obeys
+        ),
+        SystemRow(
+            "lgtok-humanml3d",
+            "LG-Tok, the authors' HumanML3D weights",
+            "lgtok",
+            "LG-Tok transformer",
+            "scale-wise autoregression",
+            text="llama",
+            prompts="clip",
+            command="convert",
+        ),
+        SystemRow(
+            "lgtok-motionx",
+            "LG-Tok, the authors' Motion-X weights",
+            "lgtok",
+            "LG-Tok transformer",
+            "scale-wise autoregression",
+            text="llama",
+            prompts="clip",
+            command="convert",
+            sampling=SamplingDefaults(guidance=1.0, cfg=2.0),
         ),
     )
 }
@@ -120,7 +148,7 @@ def describe(assets: Path, row: SystemRow) -> SystemInfo:
         family=row.family,
         tokenizer=row.tokenizer,
         generator=row.generator if has_generator or metadata is None else None,
-        text=row.text,
+        text=f"{row.text}, {row.prompts}" if row.prompts else row.text,
         parameters=numbers,
         data=metadata["data"] if metadata else "",
         checkpoint="shipped" if metadata else "absent",

@@ -46,12 +46,12 @@ class BaseEngine:
 
     def scales(self, system: str) -> list[tuple[int, int]]:
         """(tokens, codes) of every scale, coarse to fine; loads no weight."""
-        path = checkpoint_path(self.assets, row_of(system).name, "tokenizer")
-        head = header(path)
-        if head is None:
-            raise PlaygroundError(f"the system {system} has no checkpoint here; train one with the train command")
-        config = json.loads(head["__metadata__"]["config"])
+        config = self._config(system)
         return list(zip(config["scales"], config["codes"], strict=True))
+
+    def heading(self, system: str) -> str:
+        """The rule by which the features of a system read the heading off the body; loads no weight."""
+        return str(self._config(system).get("heading", "body"))
 
     def codebooks(self, system: str) -> list[NDArray[np.float32]]:
         """Code vectors [V, D] of every scale."""
@@ -85,7 +85,7 @@ class BaseEngine:
         """
         began = time.perf_counter()
         caption = normalise(caption, what="caption", allow_empty=True)
-        features, cut = prepare(motion)
+        features, cut = prepare(motion, self.heading(system))
         levels, quantized = self.runtime(system).encode(features, caption)
         return Tokenized(
             system=system,
@@ -191,6 +191,15 @@ class BaseEngine:
         )
 
     # ---- inside ---------------------------------------------------------------------------------------------------
+
+    def _config(self, system: str) -> dict[str, Any]:
+        """The config that a system's tokenizer file states."""
+        row = row_of(system)
+        head = header(checkpoint_path(self.assets, row.name, "tokenizer"))
+        if head is None:
+            raise PlaygroundError(row.absent)
+        config: dict[str, Any] = json.loads(head["__metadata__"]["config"])
+        return config
 
     def _example(self, entry: StoredExample) -> Example:
         source: Callable[[], Motion] = entry.motion if entry.joints is not None else partial(self._decoded, entry)

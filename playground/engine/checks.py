@@ -19,8 +19,11 @@ UNIT = 4  # frames: motions are floored to a multiple of it, as in the published
 Check = Callable[[], None]
 
 
-def prepare(motion: Motion) -> tuple[NDArray[np.float32], Motion]:
-    """A motion as un-normalised rows [F, 67], F a multiple of 4 and at most 196, and the F canonical poses of them."""
+def prepare(motion: Motion, heading: str = "body") -> tuple[NDArray[np.float32], Motion]:
+    """A motion as un-normalised rows [F, 67], F a multiple of 4 and at most 196, and the F canonical poses of them.
+
+    heading: the system's rule (`Engine.heading`).
+    """
     if motion.skeleton != HUMAN22 or motion.fps != LIMITS.fps:
         raise PlaygroundError(
             f"a tokenizer takes {HUMAN22.size} joints at {LIMITS.fps} frames a second, got {motion.skeleton.size}"
@@ -31,7 +34,7 @@ def prepare(motion: Motion) -> tuple[NDArray[np.float32], Motion]:
         need = (LIMITS.min_frames + 1) / LIMITS.fps
         raise PlaygroundError(f"the motion has {motion.seconds:.2f} s; a tokenizer needs at least {need:.2f} s")
     joints = canonicalise(motion.joints[: rows + 1])
-    return to_features67(joints), replace(motion, joints=joints[:rows])
+    return to_features67(joints, heading), replace(motion, joints=joints[:rows])
 
 
 def check_guidance(guidance: float, name: str = "guidance") -> None:

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
-from playground.text.features import TextFeatures, length_mask, masked_mean, run_by_length, valid_text
+from playground.text.features import EncoderId, TextFeatures, length_mask, masked_mean, run_by_length, valid_text
 
 MODEL_TYPES = {"clip": ("clip", "clip_text_model"), "llama": ("llama",), "t5": ("t5",)}
 EXPECTED = "config.json, tokenizer files and *.safetensors weights as transformers saves them"
@@ -55,12 +55,26 @@ def load_pretrained(family: str, folder: str) -> "PretrainedEncoder":
     return kind(path, tokenizer, model.eval().requires_grad_(False), missing)
 
 
-def _check_folder(family: str, path: Path) -> None:
-    """PlaygroundError unless the folder holds safetensors weights and the config of that family."""
+def identify_folder(family: str, folder: str) -> EncoderId:
+    """The identity of the encoder in a folder, without loading it. PlaygroundError as in `load_pretrained`."""
+    path = Path(folder).expanduser()
+    config = _check_folder(family, path)
+    text: Any = config.get("text_config")
+    inner = text if isinstance(text, dict) else config
+    width = inner.get("hidden_size", inner.get("d_model"))
+    if not isinstance(width, int):
+        raise PlaygroundError(
+            f"{path / 'config.json'} states no width of the {family} encoder; expected are {EXPECTED}"
+        )
+    return EncoderId(family, width, _hash(path))
+
+
+def _check_folder(family: str, path: Path) -> dict[str, Any]:
+    """The config of a folder. PlaygroundError unless it is of that family and safetensors weights are there."""
     if not path.is_dir():
         raise PlaygroundError(f"there is no folder {path} for the {family} text encoder; expected are {EXPECTED}")
     try:
-        config = json.loads((path / "config.json").read_text(encoding="utf-8"))
+        config: dict[str, Any] = json.loads((path / "config.json").read_text(encoding="utf-8"))
         kind = str(config.get("model_type"))
     except (OSError, ValueError, AttributeError) as error:
         raise PlaygroundError(f"{path} has no readable config.json; expected are {EXPECTED}") from error
@@ -68,6 +82,7 @@ def _check_folder(family: str, path: Path) -> None:
         raise PlaygroundError(f'{path} holds a model of type "{kind[:40]}", the {family} text encoder needs "{family}"')
     if not _weight_files(path):
         raise PlaygroundError(f"{path} has no *.safetensors weights; expected are {EXPECTED}")
+    return config
 
 
 def _weight_files(path: Path) -> list[Path]:
@@ -79,6 +94,12 @@ def _weight_files(path: Path) -> list[Path]:
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _hash(path: Path) -> str:
+    """sha256 of the weights file; of the files' digests, in order of name, if the weights come in parts."""
+    digests = [_sha256(file) for file in _weight_files(path)]
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
 class PretrainedEncoder:
@@ -98,9 +119,8 @@ class PretrainedEncoder:
 
     @cached_property
     def hash(self) -> str:
-        """sha256 of the weights file; of the files' digests, in order of name, if the weights come in parts."""
-        digests = [_sha256(file) for file in _weight_files(self._path)]
-        return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+        """sha256 of the weights (`identify_folder`)."""
+        return _hash(self._path)
 
     def encode(self, texts: Sequence[str]) -> TextFeatures:
         """B texts -> TextFeatures of at most LIMITS.max_text_positions tokens. PlaygroundError if one is no string."""

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 import torch
@@ -133,8 +134,27 @@ def test_a_checkpoint_refuses_another_encoder(recorded: EncoderId) -> None:
         check_same(recorded, LetterEncoder())
 
 
-@pytest.mark.parametrize("spec", ["", "MiniLM", "bert", "gpt:/somewhere", "minilm:/x", "clip", "y" * 5000])
+@pytest.mark.parametrize("spec", ["", "MiniLM", "bert", "gpt:/somewhere", "minilm:/x", "CLIP", "y" * 5000])
 def test_unknown_encoders_are_one_sentence(spec: str) -> None:
     with pytest.raises(PlaygroundError, match="unknown text encoder") as caught:
         load_encoder(spec)
     assert len(str(caught.value)) < 300 and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("family", ["clip", "llama", "t5"])
+def test_a_family_alone_stands_for_the_folder_that_the_environment_names(
+    family: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    variable = f"PLAYGROUND_{family.upper()}"
+    monkeypatch.delenv(variable, raising=False)
+    with pytest.raises(PlaygroundError, match=variable):
+        load_encoder(family)
+    monkeypatch.setenv(variable, str(tmp_path / "nowhere"))
+    with pytest.raises(PlaygroundError, match=f"no folder .*nowhere for the {family}"):
+        load_encoder(family)
+
+
+def test_a_checkpoint_whose_weights_are_not_known_takes_any_of_its_width() -> None:
+    check_same(EncoderId("letters", 2, ""), LetterEncoder())
+    with pytest.raises(PlaygroundError, match="weights unknown"):
+        check_same(EncoderId("letters", 3, ""), LetterEncoder())
