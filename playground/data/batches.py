@@ -2,23 +2,31 @@
 
 A batch is a pure function of (seed, step): nothing is remembered between steps, so a run that is resumed at step k sees
 the same batches as one that never stopped, and every process of a distributed run takes its slice of one global batch.
+Two halves: `draw` decides with a few arrays of random numbers what to cut, `fill` cuts it, all motions at once, on the
+device of the model, where the rows of all clips lie. So a batch costs a few milliseconds on any machine.
 """
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from playground.data.library import Library
 from playground.limits import LIMITS
 from playground.motion.representation import Normaliser, mirror_features67, to_features67
+from playground.nn.transfer import on_device
 from playground.text.prompts import mirror_caption
 
 if TYPE_CHECKING:
     from playground.motion.synthetic import Synthetic
+
+SLOWEST, FASTEST = 0.8, 1.25  # range of the speed changes
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,32 @@ class BatchConfig:
 
 
 @dataclass(frozen=True, eq=False)
+class Cuts:
+    """Windows that are decided and not cut yet, one a motion, arrays [n]."""
+
+    sample: NDArray[np.int64]  # which sample
+    caption: NDArray[np.int64]  # which of its captions
+    speed: NDArray[np.float64]  # how fast it is played
+    start: NDArray[np.int64]  # first row, counted after the change of speed
+    rows: NDArray[np.int64]  # length of the window
+    mirrored: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    def take(self, which: NDArray[np.int64] | slice) -> "Cuts":
+        """Some of them."""
+        return Cuts(
+            self.sample[which],
+            self.caption[which],
+            self.speed[which],
+            self.start[which],
+            self.rows[which],
+            self.mirrored[which],
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Batch:
     """features float32 [B, F, 67] normalised, zero beyond each length; lengths int64 [B]; one caption a motion.
 
@@ -55,8 +89,8 @@ class Batch:
     processes, are means over the whole batch.
     """
 
-    features: NDArray[np.float32]
-    lengths: NDArray[np.int64]
+    features: Tensor
+    lengths: Tensor
     captions: list[str]
     sources: list[str]
     mean_frames: float
@@ -94,39 +128,31 @@ def sample_weights(samples: Sequence[Sample], config: BatchConfig) -> NDArray[np
     return array / array.sum()
 
 
-def change_speed(features: NDArray[np.float32], factor: float) -> NDArray[np.float32]:
-    """Rows [F, 67] of the same motion played `factor` times as fast: interpolated, increments scaled."""
-    rows = max(int((len(features) - 1) / factor) + 1, 2)
-    at = np.minimum(np.arange(rows) * factor, len(features) - 1)
-    low = np.minimum(at.astype(np.int64), len(features) - 2) if len(features) > 1 else np.zeros(rows, np.int64)
-    share = (at - low)[:, None].astype(np.float32)
-    high = np.minimum(low + 1, len(features) - 1)
-    out = features[low] * (1 - share) + features[high] * share
-    out[:, :3] *= factor
-    return out.astype(np.float32)
-
-
-def window(rows: int, config: BatchConfig, rng: np.random.Generator) -> tuple[int, int]:
-    """Start and length of a random window of a clip of `rows` rows; the length is a multiple of the unit."""
-    longest = min(rows, LIMITS.max_frames) // config.unit * config.unit
-    length = longest
-    if rng.random() < config.whole:
-        if rng.random() < config.shorter:
-            length = max(longest - config.unit, config.unit)
-    elif longest > config.shortest:
-        length = int(rng.integers(config.shortest // config.unit, longest // config.unit + 1)) * config.unit
-    return int(rng.integers(0, rows - length + 1)), length
-
-
 class BatchSource:
-    """Draws batches from samples; holds no state of a draw."""
+    """Draws batches from samples; holds no state of a draw. The rows of all samples lie on `device`."""
 
-    def __init__(self, samples: Sequence[Sample], normaliser: Normaliser, config: BatchConfig, seed: int) -> None:
+    def __init__(
+        self,
+        samples: Sequence[Sample],
+        normaliser: Normaliser,
+        config: BatchConfig,
+        seed: int,
+        device: torch.device | str = "cpu",
+    ) -> None:
         self.samples = [s for s in samples if len(s.features) >= config.unit]
         self.normaliser = normaliser
         self.config = config
         self.seed = seed
+        self.device = torch.device(device)
         self.weights = sample_weights(self.samples, config)
+        self._lengths = np.array([len(s.features) for s in self.samples], np.int64)
+        self._starts = np.cumsum(self._lengths) - self._lengths
+        self._rows = torch.from_numpy(np.concatenate([s.features for s in self.samples])).to(self.device)
+        numbered = mirror_features67(np.arange(1.0, self._rows.shape[1] + 1)[None])[0]  # the mirror, column by column
+        self._twin = torch.from_numpy(np.abs(numbered).astype(np.int64) - 1).to(self.device)
+        self._sign = torch.from_numpy(np.sign(numbered).astype(np.float32)).to(self.device)
+        self._mean = torch.from_numpy(normaliser.mean).to(self.device)
+        self._std = torch.from_numpy(normaliser.std).to(self.device)
 
     def captions(self) -> list[str]:
         """Every caption a batch can hold, mirrored ones included."""
@@ -139,48 +165,73 @@ class BatchSource:
         block, place = divmod(step, c.bucket)
         rng = np.random.default_rng([self.seed, block])
         chosen = rng.choice(len(self.samples), size=c.size * c.bucket, p=self.weights)
-        cuts = [self.cut(self.samples[i], np.random.default_rng([self.seed, block, n])) for n, i in enumerate(chosen)]
-        cuts.sort(key=lambda cut: len(cut[0]))
-        order = rng.permutation(c.bucket)
-        start = int(order[place]) * c.size
-        whole = cuts[start : start + c.size]
-        longest, frames = max(len(cut[0]) for cut in whole), sum(len(cut[0]) for cut in whole)
-        return self.collate(whole[rank::world], longest, frames / world)
+        cuts = self.draw(chosen, rng)
+        by_length = np.argsort(cuts.rows, kind="stable")
+        first = int(rng.permutation(c.bucket)[place]) * c.size
+        whole = cuts.take(by_length[first : first + c.size])
+        return self.fill(whole.take(slice(rank, None, world)), int(whole.rows.max()), float(whole.rows.sum()) / world)
 
-    def cut(self, sample: Sample, rng: np.random.Generator) -> tuple[NDArray[np.float32], str, str]:
-        """One window of a sample: un-normalised rows [F, 67], caption, source."""
-        c = self.config
-        features, caption = sample.features, str(rng.choice(sample.captions)) if sample.captions else ""
-        if rng.random() < c.speed:
-            features = change_speed(features, float(rng.uniform(0.8, 1.25)))
-        start, length = window(len(features), c, rng)
-        features = features[start : start + length]
-        if rng.random() < c.mirror:
-            features, caption = mirror_features67(features), mirror_caption(caption)
-        return features, caption, sample.source
+    def draw(self, chosen: NDArray[np.int64], rng: np.random.Generator) -> Cuts:
+        """A random window of each of the samples chosen (numbers [n]): caption, speed, place, length, mirror."""
+        c, unit = self.config, self.config.unit
+        coin = rng.random((8, len(chosen)))
+        lengths = self._lengths[chosen]
+        speed = np.where(coin[0] < c.speed, SLOWEST + (FASTEST - SLOWEST) * coin[1], 1.0)
+        after = np.maximum(((lengths - 1) / speed).astype(np.int64) + 1, 2)
+        speed = np.where(after < unit, 1.0, speed)  # too short to be played faster
+        after = np.where(speed == 1.0, lengths, after)
+        longest = np.minimum(after, LIMITS.max_frames) // unit * unit
+        shorter = np.where(coin[3] < c.shorter, np.maximum(longest - unit, unit), longest)
+        units = np.maximum(longest // unit - c.shortest // unit + 1, 1)  # how many lengths a random window can have
+        random = np.where(
+            longest > c.shortest, (c.shortest // unit + (coin[4] * units).astype(np.int64)) * unit, longest
+        )
+        rows = np.where(coin[2] < c.whole, shorter, random)
+        start = (coin[5] * (after - rows + 1)).astype(np.int64)
+        counts = np.array([max(len(self.samples[i].captions), 1) for i in chosen])
+        return Cuts(chosen, (coin[6] * counts).astype(np.int64), speed, start, rows, coin[7] < c.mirror)
 
-    def collate(
-        self,
-        cuts: Sequence[tuple[NDArray[np.float32], str, str]],
-        longest: int | None = None,
-        mean_frames: float | None = None,
-    ) -> Batch:
-        """Windows as one normalised batch, padded on the right to `longest` rows (that of the windows by default)."""
-        lengths = np.array([len(cut[0]) for cut in cuts], np.int64)
-        longest = longest or int(lengths.max())
-        features = np.zeros((len(cuts), longest, cuts[0][0].shape[1]), np.float32)
-        for row, (rows, _, _) in enumerate(cuts):
-            features[row, : len(rows)] = self.normaliser.apply(rows)
-        frames = float(lengths.sum()) if mean_frames is None else mean_frames
-        return Batch(features, lengths, [cut[1] for cut in cuts], [cut[2] for cut in cuts], frames)
+    def fill(self, cuts: Cuts, longest: int | None = None, mean_frames: float | None = None) -> Batch:
+        """The windows as one normalised batch, padded on the right to `longest` rows (that of the windows by default).
+
+        Played `speed` times as fast means interpolated linearly, with the increments of the first columns scaled.
+        """
+        longest = longest or int(cuts.rows.max())
+
+        def column(values: NDArray[np.generic]) -> Tensor:
+            return on_device(values, self.device)[:, None]
+
+        speed, rows, last = column(cuts.speed), column(cuts.rows), column(self._lengths[cuts.sample] - 1)
+        steps = torch.arange(longest, device=self.device)[None]
+        at = torch.minimum((column(cuts.start) + steps) * speed, last)  # (B, F), float64
+        low = torch.minimum(at.long(), (last - 1).clamp(min=0))
+        share = (at - low)[..., None].float()
+        base = column(self._starts[cuts.sample])
+        features = torch.lerp(self._rows[base + low], self._rows[base + torch.minimum(low + 1, last)], share)
+        features[..., :3] *= speed[..., None].float()
+        turned = features[..., self._twin] * self._sign
+        features = torch.where(column(cuts.mirrored)[..., None], turned, features)
+        features = (features - self._mean) / self._std * (steps < rows)[..., None]
+        frames = float(cuts.rows.sum()) if mean_frames is None else mean_frames
+        captions = [self._caption(*drawn) for drawn in zip(cuts.sample, cuts.caption, cuts.mirrored, strict=True)]
+        return Batch(features, rows[:, 0], captions, [self.samples[i].source for i in cuts.sample], frames)
+
+    def _caption(self, sample: int, which: int, mirrored: bool) -> str:
+        captions = self.samples[sample].captions
+        if not captions:
+            return ""
+        return _mirrored(captions[which]) if mirrored else captions[which]
+
+
+_mirrored = lru_cache(maxsize=65_536)(mirror_caption)
 
 
 def whole_batches(samples: Sequence[Sample], normaliser: Normaliser, size: int, unit: int = 4) -> list[Batch]:
     """Every sample once, first caption, floored to the unit and cut to the longest length, sorted by length."""
-    config = BatchConfig(unit=unit)
-    source = BatchSource(samples, normaliser, config, seed=0)
-    cuts = []
-    for sample in sorted(source.samples, key=lambda s: len(s.features)):
-        length = min(len(sample.features), LIMITS.max_frames) // unit * unit
-        cuts.append((sample.features[:length], next(iter(sample.captions), ""), sample.source))
-    return [source.collate(cuts[i : i + size]) for i in range(0, len(cuts), size)]
+    source = BatchSource(samples, normaliser, BatchConfig(unit=unit), seed=0)
+    lengths = np.array([len(s.features) for s in source.samples], np.int64)
+    order = np.argsort(lengths, kind="stable")
+    zeros = np.zeros(len(order), np.int64)
+    rows = np.minimum(lengths, LIMITS.max_frames)[order] // unit * unit
+    cuts = Cuts(order, zeros, np.ones(len(order)), zeros, rows, zeros.astype(np.bool_))
+    return [source.fill(cuts.take(slice(start, start + size))) for start in range(0, len(order), size)]

@@ -4,6 +4,7 @@ import json
 import os
 import uuid
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from playground.errors import PlaygroundError
+from playground.nn.transfer import on_device
 from playground.text.features import EncoderId, TextEncoder, TextFeatures, check_same, identify
 
 FORMAT = "1"
@@ -90,6 +92,14 @@ class FeatureStore:
             distinct = list(dict.fromkeys([*store._rows, *distinct]))
         return cls.build(path, distinct, encoder, **options)
 
+    def to(self, device: torch.device | str) -> "FeatureStore":
+        """The same store with its features on another device, where lookups then happen; itself if they are there."""
+        if torch.device(device) == self._states.device:
+            return self
+        there = copy(self)
+        there._states, there._mask, there._pooled = (x.to(device) for x in (self._states, self._mask, self._pooled))
+        return there
+
     @property
     def width(self) -> int:
         """Width D of a token state."""
@@ -111,8 +121,9 @@ class FeatureStore:
         steps = torch.arange(int((stop - start).max()) if len(rows) else 0)
         inside = steps < (stop - start)[:, None]  # (B, W)
         index = (start[:, None] + steps) * inside
-        tokens = self._states[index].to(torch.float32) * inside[..., None]
         words = [self._words[row] for row in rows.tolist()]
+        index, inside, rows = (on_device(x, self._states.device) for x in (index, inside, rows))
+        tokens = self._states[index].to(torch.float32) * inside[..., None]
         return TextFeatures(tokens, self._mask[index] & inside, self._pooled[rows], words)
 
 

@@ -177,6 +177,7 @@ class MultiScaleQuantizer(nn.Module):
         self.phis = module_list(Phi(width, phi) for _ in scales)
         self.started: Tensor
         self.register_buffer("started", torch.zeros((), dtype=torch.bool))
+        self._known_started = False  # what `started` says, once it says yes: asking a GPU would wait for it
 
     @property
     def length(self) -> int:
@@ -232,10 +233,12 @@ class MultiScaleQuantizer(nn.Module):
             return self._train(z.float())
 
     def _train(self, z: Tensor) -> TrainingQuantized:
-        if self.training and not bool(self.started):
-            for book in self.codebooks:
-                book.start(z.detach().flatten(0, 1))
-            self.started.fill_(True)
+        if self.training and not self._known_started:
+            if not bool(self.started):
+                for book in self.codebooks:
+                    book.start(z.detach().flatten(0, 1))
+                self.started.fill_(True)
+            self._known_started = True
         residual, total = z.detach(), torch.zeros_like(z)
         ids = []
         commitment = z.new_zeros(())

@@ -38,6 +38,8 @@ class TokenizerTraining:
     commitment: float = 0.02
     heading: float = 0.0  # weight of smoothL1 on the accumulated heading; not in the paper, 0 there
     masked_mean: bool = False  # True: mean over real frames only; the released code counts padded frames as zeros
+    clips: int = 0  # the first so many clips of the training list; 0: all
+    longest: int = 0  # clips of more rows are left out; 0: none
     seed: int = 0
 
 
@@ -74,7 +76,8 @@ GENERATORS: dict[str, GeneratorTraining] = {
         model=GENERATOR_PRESETS["lite"],
         tokenizer="lgtok-lite-tokenizer",
         batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-        schedule=Schedule(steps=2_600, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+        schedule=Schedule(steps=4_400, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+        keep=0.8,  # the first 1,500 steps of the shipped one had 0.5
     ),
 }
 

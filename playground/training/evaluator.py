@@ -13,6 +13,7 @@ from playground.data.batches import BatchSource, Sample
 from playground.evaluation.evaluators import Evaluator
 from playground.evaluation.networks import ContrastiveNetwork, Gaussian, TMRNetwork
 from playground.evaluation.retrieval import retrieval
+from playground.nn.transfer import on_device
 from playground.text.encoders import TextEncoder, TextFeatures, identify
 from playground.text.store import FeatureStore
 from playground.training.configs import EvaluatorTraining
@@ -149,25 +150,25 @@ class EvaluatorTask:
         self.config = config
         self.batches = batches
         self.held_out = held_out  # split -> its clips
-        self.texts = texts
+        self.texts = texts.to(device)
         self.encoder = encoder
         self.data = data
         self.device = device
 
-    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, float]]:
+    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of the batch of `step`; the noise of the latents is drawn from (seed, step) over the whole batch."""
         batch = self.batches.batch(step, rank, world)
         rng = np.random.default_rng([self.config.seed, 5, step])
         noise = rng.standard_normal((self.config.batch.size, 2, self.config.model.latent), np.float32)
         inputs = EvaluatorInputs(
-            torch.from_numpy(batch.features).to(self.device),
-            torch.from_numpy(batch.lengths).to(self.device),
-            self.texts.lookup(batch.captions).to(self.device),
-            torch.from_numpy(noise[rank::world]).to(self.device),
+            batch.features.to(self.device),
+            batch.lengths.to(self.device),
+            self.texts.lookup(batch.captions),
+            on_device(noise[rank::world].copy(), self.device),
             batch.mean_frames,
         )
         loss, nearest, right = model(inputs)
-        return loss, {"InfoNCE": float(nearest), "right": float(right)}
+        return loss, {"InfoNCE": nearest, "right": right}
 
     def _retrieval(self, split: str) -> dict[str, Any] | None:
         """Retrieval figures of a split in evaluation mode; None where it holds no clip."""

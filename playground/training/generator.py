@@ -13,10 +13,10 @@ from torch.nn import functional as F
 
 from playground.checkpoints import Card, save_checkpoint
 from playground.data.batches import BatchSource
-from playground.generators.scalewise import ScalewiseTransformer, running_sums
+from playground.generators.scalewise import ScalewiseTransformer
+from playground.nn.transfer import on_device
 from playground.text.encoders import TextEncoder, TextFeatures, identify
 from playground.text.store import FeatureStore
-from playground.tokenizers.base import Tokens
 from playground.tokenizers.quantizers import MultiScaleQuantizer
 from playground.tokenizers.transformer import LGTok
 from playground.training.configs import GeneratorTraining
@@ -44,23 +44,21 @@ def build_bank(
     progress: Callable[[int, int], None] | None = None,
 ) -> TokenBank:
     """Tokenize `variants` windows of every sample (window, mirror and caption drawn anew) in evaluation mode."""
-    cuts = []
-    for index, sample in enumerate(source.samples):
-        for variant in range(variants):
-            cuts.append((index, *source.cut(sample, np.random.default_rng([source.seed, 2, index, variant]))))
-    cuts.sort(key=lambda cut: len(cut[1]))
+    chosen = np.repeat(np.arange(len(source.samples)), variants)
+    cuts = source.draw(chosen, np.random.default_rng([source.seed, 2]))
+    cuts = cuts.take(np.argsort(cuts.rows, kind="stable"))
     rows: list[NDArray[np.int16]] = []
+    captions: list[str] = []
     for start in range(0, len(cuts), source.config.size):
-        batch = source.collate([cut[1:] for cut in cuts[start : start + source.config.size]])
+        batch = source.fill(cuts.take(slice(start, start + source.config.size)))
         text = texts.lookup(batch.captions).to(device)
-        features, lengths = torch.from_numpy(batch.features).to(device), torch.from_numpy(batch.lengths).to(device)
-        tokens = tokenizer.encode(features, lengths, text).tokens
+        tokens = tokenizer.encode(batch.features.to(device), batch.lengths.to(device), text).tokens
         rows.append(torch.cat(tokens.ids, dim=1).cpu().numpy().astype(np.int16))
+        captions.extend(batch.captions)
         if progress:
-            progress(min(start + source.config.size, len(cuts)), len(cuts))
-    weights = np.array([source.weights[cut[0]] for cut in cuts])
-    lengths_all = np.array([len(cut[1]) for cut in cuts], np.int64)
-    return TokenBank(np.concatenate(rows), lengths_all, [cut[2] for cut in cuts], weights / weights.sum())
+            progress(len(captions), len(cuts))
+    weights = source.weights[cuts.sample]
+    return TokenBank(np.concatenate(rows), cuts.rows, captions, weights / weights.sum())
 
 
 class GeneratorInputs:
@@ -93,7 +91,7 @@ class GeneratorStep(nn.Module):
         """A batch -> loss, share of right arg-maxes; scalars."""
         quantizer = self._quantizer[0]
         with torch.no_grad(), torch.autocast(batch.lengths.device.type, enabled=False):
-            sums = running_sums(quantizer, Tokens(batch.noisy, quantizer.codes))
+            sums = list(quantizer.accumulate(batch.noisy[:-1]))  # not through Tokens: its checks wait for a GPU
         memory = self.transformer.remember(batch.text, batch.lengths, dropped=batch.dropped)
         return generator_loss(self.transformer(sums, memory), batch.ids)
 
@@ -120,38 +118,38 @@ class GeneratorTask:
         self.config = config
         self.bank = bank
         self.held_out = held_out
-        self.texts = texts
+        self.texts = texts.to(device)
         self.encoder = encoder
         self.data = data
         self.tokenizer_hash = tokenizer_hash
         self.device = device
 
+    def _levels(self, values: NDArray[np.generic]) -> tuple[Tensor, ...]:
+        """[B, sum of scales] on the device, one tensor a level."""
+        return on_device(values, self.device).split(self.quantizer.scales, dim=1)
+
     def _batch(self, bank: TokenBank, rows: NDArray[np.int64]) -> GeneratorInputs:
-        ids = torch.from_numpy(bank.ids[rows].astype(np.int64)).to(self.device).split(self.quantizer.scales, dim=1)
-        inputs = GeneratorInputs(tuple(ids), tuple(ids), torch.from_numpy(bank.lengths[rows]).to(self.device))
-        inputs.text = self.texts.lookup([bank.captions[row] for row in rows]).to(self.device)
+        ids = self._levels(bank.ids[rows].astype(np.int64))
+        inputs = GeneratorInputs(ids, ids, on_device(bank.lengths[rows], self.device))
+        inputs.text = self.texts.lookup([bank.captions[row] for row in rows])
         inputs.dropped = torch.zeros(len(rows), dtype=torch.bool, device=self.device)
         return inputs
 
-    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, float]]:
+    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of the batch of `step`; draw, caption drop and token noise are functions of (seed, step)."""
         c = self.config
         rng = np.random.default_rng([c.seed, 3, step])
         rows = rng.choice(len(self.bank.weights), size=c.size, p=self.bank.weights)
         dropped = rng.random(c.size) < c.caption_drop
-        keep = [rng.random((c.size, size)) < c.keep for size in self.quantizer.scales]
-        other = [
-            rng.integers(0, v, (c.size, s)) for s, v in zip(self.quantizer.scales, self.quantizer.codes, strict=True)
-        ]
+        codes = np.repeat(self.quantizer.codes, self.quantizer.scales)
+        keep = rng.random((c.size, len(codes))) < c.keep
+        other = rng.integers(0, codes, (c.size, len(codes)))
         batch = self._batch(self.bank, rows[rank::world])
-        batch.dropped = torch.from_numpy(dropped[rank::world]).to(self.device)
-        noisy = []
-        for ids, kept, random in zip(batch.ids, keep, other, strict=True):
-            mask = torch.from_numpy(kept[rank::world]).to(self.device)
-            noisy.append(torch.where(mask, ids, torch.from_numpy(random[rank::world]).to(self.device)))
-        batch.noisy = tuple(noisy)
+        batch.dropped = on_device(dropped[rank::world].copy(), self.device)
+        mixed = (batch.ids, self._levels(keep[rank::world].copy()), self._levels(other[rank::world].copy()))
+        batch.noisy = tuple(torch.where(kept, ids, random) for ids, kept, random in zip(*mixed, strict=True))
         loss, right = model(batch)
-        return loss, {"right": float(right)}
+        return loss, {"right": right}
 
     @torch.no_grad()
     def validate(self) -> dict[str, float]:

@@ -1,7 +1,8 @@
 """`train CONFIG`: builds the data, the model and the task of a named run, and fits it."""
 
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,9 @@ from playground.training.configs import (
     with_steps,
 )
 from playground.training.evaluator import EvaluatorTask
+from playground.training.family import FAMILY, SIZES
 from playground.training.generator import GeneratorTask, build_bank
-from playground.training.loop import Launch, Task, fit, start_fabric
+from playground.training.loop import Fit, Launch, Task, fit, start_fabric
 from playground.training.tokenizer import TokenizerTask
 
 Training = TokenizerTraining | GeneratorTraining | EvaluatorTraining
@@ -38,19 +40,21 @@ Training = TokenizerTraining | GeneratorTraining | EvaluatorTraining
 
 @dataclass(frozen=True)
 class Order:
-    """What was asked for besides the name of the run."""
+    """What was asked for besides the run itself."""
 
     library: Path
     out: Path
-    resume: bool
-    steps: int | None
-    launch: Launch
-    on_step: Callable[[int, float], None] | None
+    resume: bool = False
+    steps: int | None = None
+    launch: Launch = field(default_factory=Launch)
+    on_step: Callable[[int, float], None] | None = None
+    deadline: float | None = None  # time.monotonic() at which the run stops, to be resumed
+    about: dict[str, Any] = field(default_factory=dict)  # facts for the checkpoint
 
     def fit(self, fabric: Any, task: Task, config: Training, out: Path) -> dict[str, Any]:
         """Train, with the number of steps asked for."""
         schedule = with_steps(config.schedule, self.steps)
-        return fit(fabric, task, schedule, out, seed=config.seed, resume=self.resume, on_step=self.on_step)
+        return fit(Fit(fabric, task, schedule, out, config.seed, self.resume, self.deadline, self.about, self.on_step))
 
 
 def train(
@@ -58,43 +62,65 @@ def train(
     library: Path,
     out: Path,
     *,
+    size: str = "cpu",
     resume: bool = False,
     steps: int | None = None,
+    minutes: float | None = None,
     launch: Launch | None = None,
     on_step: Callable[[int, float], None] | None = None,
 ) -> dict[str, Any]:
     """Run the training named `config` on a library into the folder `out`; returns the facts of the run.
 
-    PlaygroundError for an unknown name, a folder that is no library, or a run that exists while `resume` is not set.
+    size: which of the sizes of the LG-Tok family ("cpu" or "gpu"). After so many minutes the run stops with its state
+    saved, and `resume` goes on with it. PlaygroundError for an unknown name, a folder that is no library, or a run that
+    exists while `resume` is not set.
     """
-    order = Order(library, out, resume, steps, launch or Launch(), on_step)
-    if config in TOKENIZERS:
-        return _train_tokenizer(TOKENIZERS[config], order)
-    if config in GENERATORS:
-        return _train_generator(GENERATORS[config], order)
-    if config in EVALUATORS:
-        return _train_evaluator(EVALUATORS[config], order)
-    known = ", ".join([*TOKENIZERS, *GENERATORS, *EVALUATORS])
-    raise PlaygroundError(f"unknown training {config!r}; known are {known}")
+    training = find_training(config, size)
+    deadline = None if minutes is None else time.monotonic() + 60 * minutes
+    about = {"run": config} | ({"size": size} if config in FAMILY[size] else {})
+    return run_training(training, Order(library, out, resume, steps, launch or Launch(), on_step, deadline, about))
 
 
-def training_batches(library: Library, config: Training, normaliser: Normaliser) -> BatchSource:
-    """Batches over the training split plus a share of the synthetic corpus."""
+def find_training(name: str, size: str = "cpu") -> Training:
+    """The training with that name. PlaygroundError for an unknown name or size."""
+    if size not in SIZES:
+        raise PlaygroundError(f"unknown size {size!r}; accepted: {', '.join(SIZES)}")
+    known: dict[str, Training] = {**FAMILY[size], **TOKENIZERS, **GENERATORS, **EVALUATORS}
+    if name not in known:
+        raise PlaygroundError(f"unknown training {name!r}; known are {', '.join(known)}")
+    return known[name]
+
+
+def run_training(training: Training, order: Order) -> dict[str, Any]:
+    """Run a training; returns its facts."""
+    with_steps(training.schedule, order.steps)
+    if isinstance(training, TokenizerTraining):
+        return _train_tokenizer(training, order)
+    if isinstance(training, GeneratorTraining):
+        return _train_generator(training, order)
+    return _train_evaluator(training, order)
+
+
+def training_batches(
+    library: Library, config: Training, normaliser: Normaliser, device: torch.device | str = "cpu"
+) -> BatchSource:
+    """Batches over the training split, or what the training takes of it, plus a share of the synthetic corpus."""
     samples = library_samples(library, "train")
+    if isinstance(config, TokenizerTraining):
+        samples = [s for s in samples[: config.clips or None] if len(s.features) <= (config.longest or len(s.features))]
     if not samples:
-        raise PlaygroundError(f"the library {library.path} has no clip in its train split")
+        raise PlaygroundError(f"the library {library.path} has no clip for this in its train split")
     extra = round(len(samples) * config.synthetic)
     if extra:
         samples = samples + synthetic_samples(corpus(extra, seed=0))
-    return BatchSource(samples, normaliser, config.batch, config.seed)
+    return BatchSource(samples, normaliser, config.batch, config.seed, device)
 
 
 def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
-    with_steps(config.schedule, order.steps)
     library, out = Library.open(order.library), order.out / "tokenizer"
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
-    batches = training_batches(library, config, library.normaliser)
+    batches = training_batches(library, config, library.normaliser, fabric.device)
     held_out = library_samples(library, "val")
     texts = [*batches.captions(), *(caption for sample in held_out for caption in sample.captions), ""]
     store = FeatureStore.cached(order.library, texts, encoder)
@@ -107,7 +133,6 @@ def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
 
 
 def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
-    with_steps(config.schedule, order.steps)
     tokenizer_path = order.out / "tokenizer" / "checkpoint.safetensors"
     if not tokenizer_path.is_file():
         raise PlaygroundError(f"{tokenizer_path} is absent; train {config.tokenizer} into the same folder first")
@@ -117,10 +142,10 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
     check_same(card.encoder, encoder)
-    batches = training_batches(library, config, normaliser)
+    batches = training_batches(library, config, normaliser, fabric.device)
     samples = library_samples(library, "val")
     whole = BatchConfig(size=config.batch.size, whole=1.0, shorter=0.0, mirror=0.0)
-    held_out = BatchSource(samples, normaliser, whole, config.seed) if samples else None
+    held_out = BatchSource(samples, normaliser, whole, config.seed, fabric.device) if samples else None
     texts = [*batches.captions(), *(held_out.captions() if held_out else []), ""]
     store = FeatureStore.cached(order.library, texts, encoder)
     tokenizer = tokenizer.to(fabric.device)
@@ -137,13 +162,12 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
 
 
 def _train_evaluator(config: EvaluatorTraining, order: Order) -> dict[str, Any]:
-    with_steps(config.schedule, order.steps)
     library, out = Library.open(order.library), order.out / config.model.kind
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
     clips = library.split("train") or list(range(len(library)))
     normaliser = Normaliser.fit((library.features(i) for i in clips), groups=())
-    batches = training_batches(library, config, normaliser)
+    batches = training_batches(library, config, normaliser, fabric.device)
     held_out = {split: library_samples(library, split) for split in ("val", "test")}
     own = (caption for samples in held_out.values() for sample in samples for caption in sample.captions)
     store = FeatureStore.cached(order.library, [*batches.captions(), *own, ""], encoder)

@@ -12,6 +12,7 @@ from playground.checkpoints import Card, save_checkpoint
 from playground.data.batches import Batch, BatchSource
 from playground.motion.measures import mpjpe
 from playground.motion.representation import Normaliser, from_features67
+from playground.nn.transfer import on_device
 from playground.text.encoders import TextEncoder, TextFeatures, identify
 from playground.text.store import FeatureStore
 from playground.tokenizers.transformer import LGTok, TrainingOutput
@@ -73,8 +74,13 @@ class TokenizerStep(nn.Module):
         out = self.tokenizer(batch.features, batch.lengths, batch.text, batch.dropped)
         loss = tokenizer_loss(out, batch.features, batch.lengths, self.config, self.heading_std, batch.mean_frames)
         sizes = self.tokenizer.quantizer.codes
-        used = [len(ids.unique()) / codes for ids, codes in zip(out.ids, sizes, strict=True)]
-        return loss, loss.new_tensor(used).mean(), out.commitment.detach()
+        used = [share_used(ids, codes) for ids, codes in zip(out.ids, sizes, strict=False)]
+        return loss, torch.stack(used).mean(), out.commitment.detach()
+
+
+def share_used(ids: Tensor, codes: int) -> Tensor:
+    """Share of `codes` codes that occur in ids, a scalar on their device."""
+    return torch.zeros(codes, device=ids.device).index_fill_(0, ids.flatten(), 1.0).mean()
 
 
 class TokenizerTask:
@@ -96,24 +102,24 @@ class TokenizerTask:
         self.config = config
         self.batches = batches
         self.validation = validation
-        self.texts = texts
+        self.texts = texts.to(device)
         self.encoder = encoder
         self.data = data
         self.device = device
 
     def _tensors(self, batch: Batch) -> tuple[Tensor, Tensor, TextFeatures]:
-        text = self.texts.lookup(batch.captions).to(self.device)
-        return torch.from_numpy(batch.features).to(self.device), torch.from_numpy(batch.lengths).to(self.device), text
+        text = self.texts.lookup(batch.captions)
+        return batch.features.to(self.device), batch.lengths.to(self.device), text
 
-    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, float]]:
+    def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of the batch of `step`; language drop is drawn from (seed, step) over the whole batch."""
         batch = self.batches.batch(step, rank, world)
         features, lengths, text = self._tensors(batch)
         rng = np.random.default_rng([self.config.seed, 1, step])
         drop = rng.random(self.config.batch.size) < self.config.language_drop
-        dropped = torch.from_numpy(drop[rank::world]).to(self.device)
+        dropped = on_device(drop[rank::world].copy(), self.device)
         loss, used, commitment = model(TokenizerInputs(features, lengths, text, dropped, batch.mean_frames))
-        return loss, {"codes hit": float(used), "commitment": float(commitment)}
+        return loss, {"codes hit": used, "commitment": commitment}
 
     def validate(self) -> dict[str, float]:
         """MPJPE in mm on the validation split, over clips and as a mean over sources, true captions, g = 0."""
@@ -121,7 +127,7 @@ class TokenizerTask:
         for batch in self.validation:
             features, lengths, text = self._tensors(batch)
             decoded = self.tokenizer.decode(self.tokenizer.encode(features, lengths, text).embedding, lengths, text)
-            for row, (length, source) in enumerate(zip(batch.lengths, batch.sources, strict=True)):
+            for row, (length, source) in enumerate(zip(batch.lengths.tolist(), batch.sources, strict=True)):
                 error = clip_error(features[row, :length], decoded[row, :length], self.batches.normaliser)
                 errors.setdefault(source, []).append(error)
         means = {source: float(np.mean(values)) for source, values in errors.items()}

@@ -10,10 +10,9 @@ import torch
 from torch.nn import functional as F
 
 from playground.checkpoints import load_generator, load_tokenizer, read_card
-from playground.data.batches import BatchConfig, BatchSource, Sample, change_speed, sample_weights, window
+from playground.data.batches import BatchConfig
 from playground.data.library import Library, LibraryClip, write_library
 from playground.errors import PlaygroundError
-from playground.motion.representation import Normaliser, from_features67, to_features67
 from playground.tokenizers.transformer import TrainingOutput
 from playground.training import configs, run
 from playground.training.configs import GeneratorTraining, Schedule, TokenizerTraining, rate_at, with_steps
@@ -40,9 +39,9 @@ def library(tmp_path) -> Path:
 @pytest.fixture
 def runs(monkeypatch):
     """Two runs of tiny models under the names `tiny-tokenizer` and `tiny-generator`."""
-    tokenizer = TokenizerTraining(replace(TINY, dropout=0.1), BATCH, PLAN, synthetic=0.0)
+    tokenizer = TokenizerTraining(replace(TINY, dropout=0.1, max_frames=196), BATCH, PLAN, synthetic=0.0)
     generator = GeneratorTraining(
-        replace(TINY_GENERATOR, dropout=0.1), "tiny-tokenizer", BATCH, PLAN, size=4, variants=2, synthetic=0.0
+        replace(TINY_GENERATOR, dropout=0.1, lengths=49), "tiny-tokenizer", BATCH, PLAN, size=4, variants=2, synthetic=0.0
     )
     monkeypatch.setitem(configs.TOKENIZERS, "tiny-tokenizer", tokenizer)
     monkeypatch.setitem(configs.GENERATORS, "tiny-generator", generator)
@@ -82,7 +81,7 @@ def test_checkpoints_describe_themselves_and_load(library, tmp_path, runs):
     path = tmp_path / "out" / "tokenizer" / "checkpoint.safetensors"
     model, card = load_tokenizer(path)
     assert card.data == "tiny library" and card.facts["step"] == 6 and card.encoder.name == "minilm"
-    assert card.config == replace(TINY, dropout=0.1, text_width=384)
+    assert card.config == replace(TINY, dropout=0.1, max_frames=196, text_width=384)
     assert "mpjpe_mm_source_mean" in card.facts["validation"][-1]
     normaliser = Library.open(library).normaliser
     np.testing.assert_allclose(card.normaliser.mean, normaliser.mean)
@@ -112,60 +111,6 @@ def test_unknown_names_and_missing_tokenizers_are_refused(library, tmp_path, run
         run.train("tiny-generator", library, tmp_path / "out")
     with pytest.raises(PlaygroundError, match="at least 1 step"):
         run.train("tiny-tokenizer", library, tmp_path / "out", steps=0)
-
-
-# ---- batches ------------------------------------------------------------------------------------------------------
-
-
-def source(size: int = 4, **changes) -> BatchSource:
-    samples = [Sample(to_features67(drifting(30 + 7 * n, n)), (f"left {n}",), "AB"[n % 2], "walk") for n in range(6)]
-    normaliser = Normaliser.fit([s.features for s in samples])
-    return BatchSource(samples, normaliser, replace(BATCH, size=size, **changes), seed=3)
-
-
-def test_a_batch_is_a_function_of_seed_and_step():
-    first, again = source().batch(5), source().batch(5)
-    np.testing.assert_array_equal(first.features, again.features)
-    assert first.captions == again.captions and first.captions != source().batch(6).captions
-    assert all(length % 4 == 0 for length in first.lengths)
-
-
-def test_the_slices_of_two_processes_are_the_whole_batch():
-    whole, halves = source().batch(2), [source().batch(2, rank, 2) for rank in range(2)]
-    assert sorted(whole.captions) == sorted(halves[0].captions + halves[1].captions)
-    assert [len(h.captions) for h in halves] == [2, 2]
-
-
-def test_mirrored_motion_comes_with_a_mirrored_caption():
-    drawn = source(size=8, mirror=1.0, speed=0.0).batch(0)
-    assert all(caption.startswith("right") for caption in drawn.captions)
-    plain = source(size=8, mirror=0.0, speed=0.0).batch(0)
-    assert all(caption.startswith("left") for caption in plain.captions)
-
-
-@pytest.mark.parametrize("rows", [4, 17, 39, 195, 196, 197, 1000])
-def test_windows_lie_inside_the_clip_and_are_multiples_of_the_unit(rows):
-    rng = np.random.default_rng(0)
-    for _ in range(200):
-        start, length = window(rows, BATCH, rng)
-        assert length % 4 == 0 and 4 <= length <= 196 and 0 <= start <= rows - length
-
-
-def test_weights_balance_sources():
-    samples = [Sample(np.zeros((8, 67), np.float32), (), source, "x") for source in "AAAAAAAAB"]
-    equal = sample_weights(samples, replace(BATCH, source_balance=1.0, action_balance=1.0))
-    assert equal[-1] == pytest.approx(0.5) and equal.sum() == pytest.approx(1.0)
-    counted = sample_weights(samples, replace(BATCH, source_balance=0.0, action_balance=0.0))
-    np.testing.assert_allclose(counted, 1 / 9)
-
-
-def test_double_speed_covers_the_same_ground_in_half_the_time():
-    features = to_features67(drifting(81))
-    fast = change_speed(features, 2.0)
-    assert len(fast) == 40
-    end, end_fast = (from_features67(f)[-1, 0, [0, 2]] for f in (features, fast))
-    np.testing.assert_allclose(end_fast, end, atol=0.06)
-    np.testing.assert_array_equal(change_speed(features, 1.0), features)
 
 
 # ---- numbers ------------------------------------------------------------------------------------------------------
