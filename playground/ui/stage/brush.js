@@ -5,6 +5,7 @@ import { el } from "./dom.js";
 
 const REACH = 12; // pixels on either side of a handle's line that take hold of it
 const LEAST = 1; // frames
+const HAIR = 0.01; // part of a frame that a pointer may be beside an edge
 
 export class Brush {
   // axis: {element, store, xOf(frame), frameAt(event)}
@@ -107,6 +108,7 @@ export class Brush {
 
 // Whole frames [start, stop] of a drag; null when it is shorter than a frame: a mere click clears the span.
 function between(a, b, frames) {
-  const start = Math.max(0, Math.floor(Math.min(a, b))), stop = Math.min(frames, Math.ceil(Math.max(a, b)));
+  const start = Math.max(0, Math.floor(Math.min(a, b) + HAIR));
+  const stop = Math.min(frames, Math.ceil(Math.max(a, b) - HAIR));
   return Math.abs(a - b) < 1 || stop <= start ? null : [start, stop];
 }

@@ -10,7 +10,7 @@ const PALEST = 0.85; // share of the ground in a cell as unsure as can be
 export function paintRow(ctx, track, row, frames, width, theme, alpha) {
   const level = track.levels[row.level];
   const digits = String(level.codes - 1).length, cell = width * (track.frames / frames / level.size);
-  const written = cell > DIGIT * digits + 3; // all ids of a row, or none
+  const written = cell > DIGIT * digits + 5; // all ids of a row, or none
   ctx.globalAlpha = alpha;
   for (let position = 0; position < level.size; position++) {
     const [from, to] = cellEdges(track, row.level, position, frames, width);

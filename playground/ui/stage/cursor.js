@@ -1,4 +1,4 @@
-// The score by keyboard: one cell of a grid has the cursor, arrows move it, Enter chooses. Screen readers hear the cell.
+// The score by keyboard: one cell of a grid has the cursor, arrows move it, Enter chooses. Screen readers hear it.
 
 import { el } from "./dom.js";
 import { cellEdges, describeCell, describeProbe } from "./rows.js";
@@ -17,7 +17,10 @@ export class Cursor {
     scroller.tabIndex = 0;
     scroller.setAttribute("aria-activedescendant", this.cell.id);
     scroller.addEventListener("keydown", (event) => this.press(event));
-    scroller.addEventListener("focus", () => scroller.matches(":focus-visible") && this.enter());
+    scroller.addEventListener("focus", () => {
+      this.byKeyboard = scroller.matches(":focus-visible");
+      if (this.byKeyboard) this.enter();
+    });
     scroller.addEventListener("blur", () => this.leave());
   }
 
@@ -46,7 +49,8 @@ export class Cursor {
       }
       return;
     }
-    if (this.move(event.key, hover, probe)) event.preventDefault();
+    const clocks = event.key === "Home" || event.key === "End"; // after a click these two are still the clock's
+    if ((this.byKeyboard || !clocks) && this.move(event.key, hover, probe)) event.preventDefault();
   }
 
   // false if the key means nothing here, so that others may have it.
@@ -99,8 +103,8 @@ export class Cursor {
 
   enterLine(line, hover, probe) {
     const { tracks, strips } = this.score.data;
-    const [from, to] = probe ? [probe.frame, probe.frame + 1] : shareOf(tracks[hover.track], hover.level, hover.position);
-    const middle = (from + to) / 2;
+    const share = hover && shareOf(tracks[hover.track], hover.level, hover.position);
+    const middle = share ? (share[0] + share[1]) / 2 : probe.frame + 0.5;
     if (line.strip !== undefined) {
       return this.go(null, { ...line, frame: clamp(Math.floor(middle), strips[line.strip].frames) });
     }

@@ -236,8 +236,9 @@ export class Figures {
     const span = litToken(this.data.tracks, this.store.state)?.span;
     const look = { plain: this.plain, halo: span && frame >= span[0] && frame < span[1] ? css(theme.focus) : null };
     if (frame >= figure.frames + 0.5) this.paintThrough(figure, 0.45, look); // a shorter motion has ended and waits
-    else if (layout === "overlay" && figures.length > 1) this.paintThrough(figure, figure === figures[0] ? 0.9 : 0.68, look);
-    else painter.paint(ctx, screen, camera.focal, figure.tones, look);
+    else if (layout === "overlay" && figures.length > 1) {
+      this.paintThrough(figure, figure === figures[0] ? 0.9 : 0.68, look);
+    } else painter.paint(ctx, screen, camera.focal, figure.tones, look);
     const { probe } = this.store.state, marked = probe && jointsOf(this.data.strips[probe.strip], probe.row);
     if (marked) paintJoints(ctx, camera, theme, this.pose, this.data.skeleton.parents, marked, dx, dz);
   }

@@ -38,7 +38,8 @@ export function keyLines(data) {
     ));
   }
   for (const track of data.tracks.filter(({ levels }) => levels.some((level) => level.marks))) {
-    const marked = track.levels.filter((level) => level.marks), all = marked.reduce((sum, level) => sum + level.size, 0);
+    const marked = track.levels.filter((level) => level.marks);
+    const all = marked.reduce((sum, level) => sum + level.size, 0);
     const marks = marked.reduce((sum, level) => sum + level.marks.reduce((count, mark) => count + mark, 0), 0);
     const whose = data.tracks.length > 1 ? `${track.name}: ` : "";
     lines.push(el(

@@ -31,8 +31,8 @@ export function tallOf(figures, width, head) {
   return Math.max(1.6, ...heads) + 0.2;
 }
 
-// {rows, across, spacing}: one row of figures or two, whichever shows them larger with their names whole; spacing of the lanes in metres.
-// width, height: of the picture in CSS pixels; half, tall: reach and height in metres.
+// {rows, across, spacing}: one row of figures or two, whichever shows them larger with their names whole; spacing of
+// the lanes in metres. width, height: of the picture in CSS pixels; half, tall: reach and height in metres.
 export function arrange(count, width, height, half, tall) {
   const least = Math.min(2, Math.max(0.85, 1.3 * half));
   const plans = (count >= CROWD ? [1, 2] : [1]).map((rows) => {

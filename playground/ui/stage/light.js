@@ -41,7 +41,8 @@ function paintOthers(ctx, view, { cell, span, chosen }) {
     if (row.track === cell.track || !track.levels[row.level].ids) continue;
     const range = governing(track, row.level, span);
     if (!range) continue;
-    const [from] = edges(view, { ...row, position: range[0] }), [, to] = edges(view, { ...row, position: range[1] - 1 });
+    const [from] = edges(view, { ...row, position: range[0] });
+    const [, to] = edges(view, { ...row, position: range[1] - 1 });
     outline(ctx, from, row.y, to - from, row.height, css(theme.surface, 0.9), 3);
     outline(ctx, from, row.y, to - from, row.height, css(chosen ? theme.focus : theme.text), 1.5);
   }

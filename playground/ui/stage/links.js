@@ -59,8 +59,8 @@ export function watchState(store, isBusy, tell) {
 function there(selection, data) {
   const track = data.tracks.find(({ system }) => system === selection?.system);
   const { scale, position } = selection || {};
-  const size = track?.levels[scale - 1]?.size;
-  return Number.isInteger(position) && position >= 0 && position < size ? { system: track.system, scale, position } : null;
+  const good = Number.isInteger(position) && position >= 0 && position < track?.levels[scale - 1]?.size;
+  return good ? { system: track.system, scale, position } : null;
 }
 
 function clamp(value, low, high) {

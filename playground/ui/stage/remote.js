@@ -64,7 +64,8 @@ export class Remote {
     return snapshot(this.figures.canvas, this.figures.labels.nodes, this.figures.theme);
   }
 
-  // event: "state" (what a link holds, once it has come to rest), "select", "span", "scale" (on commit), "change" (any value of the state), "frame" (each drawn frame).
+  // event: "select", "span", "scale" (on commit), "state" (what a link holds, once it has come to rest), "change" (any
+  // value of the state), "frame" (each drawn frame).
   on(event, listener) {
     if (event !== "frame") return this.store.on(event, listener);
     (this.frameListeners ??= new Set()).add(listener);

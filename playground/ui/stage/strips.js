@@ -86,7 +86,8 @@ export function jointsOf(strip, row) {
 export function tellStrip(strip, fps) {
   const most = strip.values.reduce((best, value, i) => (value > strip.values[best] ? i : best), 0);
   const row = strip.rows[Math.floor(most / strip.frames)], second = ((most % strip.frames) / fps).toFixed(2);
-  return `${strip.name}: ${strip.rows.length} rows, the largest ${told(strip.values[most])} ${strip.unit} at ${row}, ${second} s`;
+  const largest = `${told(strip.values[most])} ${strip.unit}`.trim();
+  return `${strip.name}: ${strip.rows.length} rows, the largest ${largest} at ${row}, ${second} s`;
 }
 
 function breaks(strip) {

@@ -8,6 +8,8 @@ import { litToken } from "./store.js";
 
 const HEIGHT = 30; // CSS pixels
 const BAR = HEIGHT - 9; // top of the bar
+const HINT = "Drag to scrub, alt+drag to choose a span";
+const SPAN_HINT = "Drag to choose a span, drag the dot to scrub";
 const THICK = 4; // pixels of the bar; more where frames are hatched
 const KNOB = 10; // pixels on either side that take hold of the playhead in span mode
 
@@ -21,7 +23,7 @@ export class Timeline {
     this.peek = el("i", { class: "ms-peek", hidden: true });
     this.slider = el("div", {
       class: "ms-time-slider", role: "slider", tabindex: "0", "aria-label": "Time", "aria-valuemin": "0",
-      title: "Drag to scrub, alt+drag to choose a span",
+      title: HINT,
     });
     const parts = [this.canvas, this.elapsed, this.slider];
     this.element = el("div", { class: "ms-ruler" }, ...parts);
@@ -49,7 +51,7 @@ export class Timeline {
   setSpanMode(on) {
     this.spanMode = Boolean(on);
     this.element.classList.toggle("is-spanning", this.spanMode);
-    this.slider.title = on ? "Drag to choose a span; drag the dot to scrub" : "Drag to scrub, alt+drag to choose a span";
+    this.slider.title = on ? SPAN_HINT : HINT;
   }
 
   // What moves at every frame is two elements, so that the canvas stands still.

@@ -34,7 +34,7 @@ export class Toolbar {
     this.element = el(
       "div", { class: "ms-toolbar", role: "group", "aria-label": "Playback" },
       el("div", { class: "ms-group" }, back, this.play, next),
-      el("div", { class: "ms-time" }, this.now, this.total, this.count),
+      el("div", { class: "ms-time" }, this.now, this.total, " ", this.count),
       el("div", { class: "ms-group", role: "group", "aria-label": "Speed" }, ...this.speeds),
       el("div", { class: "ms-group ms-toggles" }, ...Object.values(this.toggles), this.overlay, this.reset),
     );

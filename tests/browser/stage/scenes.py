@@ -43,6 +43,32 @@ def payload(**settings: Any) -> scene.Json:
     return scene.payload(figures, tracks, **settings)
 
 
+MARKED = np.arange(SIZES[2]) % 5 == 1
+SPANS = np.array([[0, 30], [4, 26], [10, 30], [20, 40], [30, 46], [36, 48]])  # measured, of the second scale
+KEPT = [(0, 12), (30, 48)]
+DIFFERENCE = np.abs(np.random.default_rng(5).normal(size=(FRAMES, 22))) * 0.01
+DIFFERENCE[20, HUMAN22.index("l_wrist")] = 0.25  # the largest by far
+WORDS = ("a", "person", "swings", "both", "arms")
+ATTENTION = np.random.default_rng(6).dirichlet(np.ones(len(WORDS)), FRAMES).T
+
+
+def rich(**settings: Any) -> scene.Json:
+    """The same two figures; measured spans, marks and entropy; hatched frames; a heat map of joints, one of words."""
+    rows = [scene.level(ids, codes) for ids, codes in zip(IDS, CODES, strict=True)]
+    rows[1] = scene.level(IDS[1], CODES[1], spans=SPANS)
+    rows[2] = scene.level(IDS[2], CODES[2], marks=MARKED, entropy=np.linspace(0, np.log(CODES[2]), SIZES[2]))
+    short = [scene.level(np.array([1, 2, 3, 4]), 8), scene.level(np.arange(8), 8)]
+    tracks = [
+        scene.track("lgtok-lite", "LG-Tok", FRAMES, rows, scene.NOT_FRAMES, marked="differs without the caption"),
+        scene.track("momask-lite", "MoMask", 32, short),
+    ]
+    strips = [
+        scene.joint_strip("difference", "Difference", DIFFERENCE),
+        scene.strip("attention", "Attention", "", WORDS, ATTENTION),
+    ]
+    return scene.payload(payload()["figures"], tracks, strips=strips, hatch=KEPT, **settings)
+
+
 def guided() -> tuple[scene.Json, dict[str, np.ndarray]]:
     """A stage whose figures are recovered in the browser: one live, one at g = 4."""
     rows = to_features67(walk(FRAMES + 1, 0.03))
@@ -145,6 +171,15 @@ class Shown:
         width = self.call("return stage.score.width")
         frames, size = ((FRAMES, SIZES[level]), (32, 4))[track]
         return box["x"] + (position + 0.5) * frames / size / FRAMES * width, box["y"] + y
+
+    def value(self, strip: int, row: int, frame: float) -> tuple[float, float]:
+        """A place in a heat map, scrolled into the window."""
+        self.page.locator(".ms-tracks").evaluate("node => node.scrollIntoView({ block: 'end' })")
+        box = self.page.locator(".ms-still").bounding_box()
+        assert box is not None
+        y, step = self.call("const p = stage.score.laid.strips[argument]; return [p.y, p.step]", strip)
+        width = self.call("return stage.score.width")
+        return box["x"] + (frame + 0.5) / FRAMES * width, box["y"] + y + (row + 0.5) * step
 
     def events(self) -> list[Any]:
         found: list[Any] = self.page.evaluate("() => window.heard")
