@@ -52,8 +52,10 @@ def systems(as_json: bool) -> None:
         return
     for row in rows:
         parts = [str(row[key]) for key in ("tokenizer", "generator") if row[key]]
-        say(f"{row['name']:<22} {' + '.join(parts)}, text {row['text']}, {row['parameters']:,} parameters, "
-            f"data {row['data']}, checkpoint {row['checkpoint']}")  # fmt: skip
+        here = f"{row['parameters']:,} parameters, data {row['data']}, checkpoint {row['checkpoint']}"
+        if row["checkpoint"] == "absent":
+            here = "checkpoint absent" + (": not trained yet" if row_of(row["name"]).command == "train" else "")
+        say(f"{row['name']:<22} {' + '.join(parts)}, text {row['text']}, {here}")
 
 
 def tokenize(clip: str, caption: str | None, system: str, start: float, library: Path | None, to: Path | None) -> None:
@@ -124,6 +126,21 @@ def prepare(source: str, root: Path | None, out: Path) -> None:
     for note in prepared.notes:
         say(note)
     say(f"{out}: {prepared.clips} clips")
+
+
+def convert(
+    family: str, tokenizer: Path, generator: Path, options: Path, out: Path, statistics: Path | None,
+    llama: str | None, clip: str | None,
+) -> None:  # fmt: skip
+    """The released files of other authors to checkpoints; `family` is lgtok, the one there is."""
+    from playground.convert import convert_lgtok
+
+    with Progress(f"converting {family}"):
+        done = convert_lgtok(tokenizer, generator, options, out, statistics=statistics, llama=llama, clip=clip)
+    for note in done.notes:
+        say(note)
+    for path in done.files:
+        say(str(path))
 
 
 def train(

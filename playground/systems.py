@@ -45,20 +45,32 @@ class SystemRow:
     @property
     def absent(self) -> str:
         """The sentence for a person who asks for it where its files are not."""
-        return f"the system {self.name} has no checkpoint here; the {self.command} command makes one"
+        state = "is not trained yet: it has" if self.command == "train" else "has"
+        return f"the system {self.name} {state} no checkpoint here; the {self.command} command makes one"
+
+
+def _ours(name: str, title: str, *, scalewise: bool = True) -> SystemRow:
+    """A row of the LG-Tok family that this repository trains."""
+    return SystemRow(
+        name,
+        title,
+        "lgtok",
+        "LG-Tok transformer" if scalewise else "LG-Tok transformer, plain residual levels",
+        "scale-wise autoregression" if scalewise else None,
+        sampling=SamplingDefaults(guidance=0.0, cfg=3.0),  # chosen on lgtok-lite by the plain prompts that it obeys
+    )
 
 
 SYSTEMS: dict[str, SystemRow] = {
     row.name: row
     for row in (
-        SystemRow(
-            "lgtok-lite",
-            "LG-Tok lite",
-            "lgtok",
-            "LG-Tok transformer",
-            "scale-wise autoregression",
-            sampling=SamplingDefaults(guidance=0.0, cfg=3.0),  # chosen by the plain prompts that it obeys
-        ),
+        _ours("lgtok", "LG-Tok"),
+        _ours("lgtok-mid", "LG-Tok mid, 160 tokens"),
+        _ours("lgtok-mini", "LG-Tok mini, 104 tokens"),
+        _ours("lgtok-notext", "LG-Tok without text"),
+        _ours("lgtok-nodrop", "LG-Tok without language drop"),
+        _ours("lgtok-rvq", "LG-Tok with MoMask's quantizer", scalewise=False),
+        _ours("lgtok-lite", "LG-Tok lite"),
         SystemRow(
             "lgtok-humanml3d",
             "LG-Tok, the authors' HumanML3D weights",

@@ -81,7 +81,8 @@ class Services:
         assets, mark = self.engine().assets, hashlib.sha256()
         for system in self.engine().systems():
             heads = [header(checkpoint_path(assets, system.name, part)) for part in ("tokenizer", "generator")]
-            mark.update(json.dumps([system.name, heads], sort_keys=True).encode())
+            if any(heads):
+                mark.update(json.dumps([system.name, heads], sort_keys=True).encode())
         return mark.hexdigest()[:16]
 
     def first_view(self, name: str, compute: Callable[["Services"], View]) -> View:
@@ -102,12 +103,14 @@ class Services:
 
     def sampling(self) -> SamplingDefaults:
         """How the default system generates where nothing else is asked for."""
-        found = [system.sampling for system in self.engine().systems() if system.checkpoint == "shipped"]
-        return found[0] if found else SamplingDefaults()
+        try:
+            return self.default_system().sampling
+        except PlaygroundError:
+            return SamplingDefaults()
 
     def default_system(self) -> "SystemInfo":
-        """The first system with a shipped checkpoint; PlaygroundError if none is shipped."""
-        for system in self.engine().systems():
-            if system.checkpoint == "shipped":
-                return system
-        raise PlaygroundError("no trained system is shipped with this copy; train one with: make train")
+        """The first shipped system that can generate, or else the first shipped one; PlaygroundError if none is."""
+        shipped = [system for system in self.engine().systems() if system.checkpoint == "shipped"]
+        if not shipped:
+            raise PlaygroundError("no trained system is shipped with this copy; train one with: make train")
+        return next((system for system in shipped if system.generator), shipped[0])

@@ -41,7 +41,13 @@ def runs(monkeypatch):
     """Two runs of tiny models under the names `tiny-tokenizer` and `tiny-generator`."""
     tokenizer = TokenizerTraining(replace(TINY, dropout=0.1, max_frames=196), BATCH, PLAN, synthetic=0.0)
     generator = GeneratorTraining(
-        replace(TINY_GENERATOR, dropout=0.1, lengths=49), "tiny-tokenizer", BATCH, PLAN, size=4, variants=2, synthetic=0.0
+        replace(TINY_GENERATOR, dropout=0.1, lengths=49),
+        "tiny-tokenizer",
+        BATCH,
+        PLAN,
+        size=4,
+        variants=2,
+        synthetic=0.0,
     )
     monkeypatch.setitem(configs.TOKENIZERS, "tiny-tokenizer", tokenizer)
     monkeypatch.setitem(configs.GENERATORS, "tiny-generator", generator)
