@@ -4,7 +4,7 @@ Every pass runs over the batches of its items (items.portions), those of this pr
 items, the same on every process (spread.py).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -77,26 +77,52 @@ class Passes:
 
     def texts(self, items: Sequence[Item]) -> dict[str, Floats]:
         """Embeddings [n, D] of the captions by every evaluator; zeros where a caption is empty."""
-        out = self._embeddings(len(items))
+        out = self._nothing(len(items)).embeddings
         for part in self._mine(items):
             if items[part[0]].caption:
                 for name, evaluator in self.evaluators.items():
                     out[name][part] = evaluator.embed_texts([items[place].caption for place in part])
-        return self._shared(out)
+        return {name: self.spread.total(array) for name, array in out.items()}
 
     def recorded(self, items: Sequence[Item]) -> Motions:
         """The recorded motions themselves."""
-        return self._measured(items, self._recorded)
+        motions = self._nothing(len(items))
+        for part in self._mine(items):
+            self._fill(motions, part, self._cut([items[place] for place in part]), made=False)
+            self.tally.add(len(part))
+        return self._shared(motions)
 
     def generated(self, items: Sequence[Item]) -> Motions:
         """Motions made from the captions, as long as the recorded ones."""
-        return self._measured(items, self._generate)
+        motions = self._nothing(len(items))
+        for part in self._mine(items):
+            self._fill(motions, part, self._generate([items[place] for place in part]))
+            self.tally.add(len(part))
+        return self._shared(motions)
+
+    def swept(self, items: Sequence[Item], scales: Sequence[float]) -> list[Motions]:
+        """The same tokens decoded at every guidance scale g, one entry a scale; both branches are decoded once (A8)."""
+        import torch
+
+        motions = [self._nothing(len(items)) for _ in scales]
+        for part in self._mine(items):
+            batch = [items[place] for place in part]
+            lengths = torch.tensor([i.rows for i in batch], device=self.runtime.device)
+            text = self.runtime.texts([i.caption for i in batch])
+            with_text, without = (
+                branch.cpu().numpy() for branch in self.runtime.tokenizer.branches(self.draw(batch), lengths, text)
+            )
+            for g, filled in zip(scales, motions, strict=True):
+                rows = self.runtime.normaliser.invert((1 + g) * with_text - g * without)
+                self._fill(filled, part, [one[: item.rows] for one, item in zip(rows, batch, strict=True)])
+            self.tally.add(len(part))
+        return [self._shared(filled) for filled in motions]
 
     def samples(self, items: Sequence[Item], name: str) -> Floats:
         """Embeddings [n, D] by one evaluator of motions made from the captions."""
         out = np.zeros((len(items), self.evaluators[name].width))
         for part in self._mine(items):
-            out[part] = self.evaluators[name].embed_rows(self._generate([items[place] for place in part]))
+            out[part] = self.embed(name, self._generate([items[place] for place in part]))
             self.tally.add(len(part))
         return self.spread.total(out)
 
@@ -113,14 +139,14 @@ class Passes:
     def rebuilt(self, items: Sequence[Item]) -> Rebuilt:
         """Recorded motions tokenized and decoded again; with a generator, how it would have predicted their tokens."""
         scales = self.runtime.tokenizer.quantizer.scales
-        motions, errors = _Filling(len(items), self._embeddings(len(items))), np.zeros(len(items))
+        motions, errors = self._nothing(len(items)), np.zeros(len(items))
         ids, predictions = np.zeros((2, len(items), sum(scales)))
         likelihood = np.zeros((len(items), len(scales)))
         for part in self._mine(items):
             batch = [items[place] for place in part]
-            given = self._recorded(batch)
+            given = self._cut(batch, self.runtime.tokenizer.config.heading)
             tokens, made = self._rebuild(batch, given)
-            motions.fill(part, made, self.evaluators)
+            self._fill(motions, part, made)
             for place, rows, true in zip(part, made, given, strict=True):
                 errors[place] = joint_errors(from_features67(true), from_features67(rows)).mean()
             ids[part] = np.concatenate([level.cpu().numpy() for level in tokens.ids], axis=1)
@@ -130,7 +156,7 @@ class Passes:
         cuts = np.cumsum(scales)[:-1]
         there = self.runtime.generator is not None
         return Rebuilt(
-            motions.shared(self.spread),
+            self._shared(motions),
             self.spread.total(errors),
             np.split(self.spread.total(ids).astype(np.int64), cuts, axis=1),
             list(self.spread.total(likelihood).T) if there else [],
@@ -144,12 +170,15 @@ class Passes:
         captions, rows, seeds = [i.caption for i in batch], [i.rows for i in batch], [i.seed for i in batch]
         return self.runtime.generate_batch(captions, rows, seeds, self.sampling).embedding
 
-    def _generate(self, batch: Sequence[Item]) -> list[Rows]:
-        captions, rows = [i.caption for i in batch], [i.rows for i in batch]
-        return self.runtime.decode_batch(self.draw(batch), rows, captions, self.guidance)
+    def decode(self, batch: Sequence[Item], embedding: "Tensor", guidance: float) -> list[Rows]:
+        """Un-normalised rows of the motions of a batch."""
+        return self.runtime.decode_batch(embedding, [i.rows for i in batch], [i.caption for i in batch], guidance)
 
-    def _recorded(self, batch: Sequence[Item]) -> list[Rows]:
-        return [self.library.features(i.index)[i.start : i.start + i.rows] for i in batch]
+    def _generate(self, batch: Sequence[Item]) -> list[Rows]:
+        return self.decode(batch, self.draw(batch), self.guidance)
+
+    def _cut(self, batch: Sequence[Item], heading: str = "body") -> list[Rows]:
+        return [self.library.features(i.index, heading)[i.start : i.start + i.rows] for i in batch]
 
     def _rebuild(self, batch: Sequence[Item], given: Sequence[Rows]) -> tuple[Any, list[Rows]]:
         import torch
@@ -180,37 +209,30 @@ class Passes:
 
     # ---- arrays ---------------------------------------------------------------------------------------------------
 
-    def _measured(self, items: Sequence[Item], source: Callable[[Sequence[Item]], list[Rows]]) -> Motions:
-        motions = _Filling(len(items), self._embeddings(len(items)))
-        for part in self._mine(items):
-            motions.fill(part, source([items[place] for place in part]), self.evaluators)
-            self.tally.add(len(part))
-        return motions.shared(self.spread)
-
     def _mine(self, items: Sequence[Item]) -> list[list[int]]:
         return self.spread.mine(portions(items))
 
-    def _embeddings(self, count: int) -> dict[str, Floats]:
-        return {name: np.zeros((count, evaluator.width)) for name, evaluator in self.evaluators.items()}
+    def embed(self, name: str, rows: Sequence[Rows], made: bool = True) -> NDArray[np.float32]:
+        """Embeddings of motions given as un-normalised rows, made by the system or cut from the library.
 
-    def _shared(self, arrays: dict[str, Floats]) -> dict[str, Floats]:
-        return {name: self.spread.total(array) for name, array in arrays.items()}
+        The evaluators read rows whose heading is read off the body; those of a system with another rule take the way
+        over the joints.
+        """
+        if made and self.runtime.tokenizer.config.heading != "body":
+            return self.evaluators[name].embed_motions([from_features67(one) for one in rows])
+        return self.evaluators[name].embed_rows(rows)
 
+    def _nothing(self, count: int) -> Motions:
+        embeddings = {name: np.zeros((count, evaluator.width)) for name, evaluator in self.evaluators.items()}
+        return Motions(embeddings, np.zeros(count), np.zeros(count))
 
-class _Filling:
-    """Arrays over n motions that are filled batch by batch."""
-
-    def __init__(self, count: int, embeddings: dict[str, Floats]) -> None:
-        self.embeddings = embeddings
-        self.sliding, self.drift = np.zeros((2, count))
-
-    def fill(self, part: list[int], rows: list[Rows], evaluators: dict[str, "Evaluator"]) -> None:
-        for name, evaluator in evaluators.items():
-            self.embeddings[name][part] = evaluator.embed_rows(rows)
+    def _fill(self, motions: Motions, part: list[int], rows: list[Rows], made: bool = True) -> None:
+        for name in self.evaluators:
+            motions.embeddings[name][part] = self.embed(name, rows, made)
         for place, one in zip(part, rows, strict=True):
             joints = from_features67(one)
-            self.sliding[place], self.drift[place] = foot_sliding(joints), bone_drift(joints)
+            motions.sliding[place], motions.drift[place] = foot_sliding(joints), bone_drift(joints)
 
-    def shared(self, spread: Spread) -> Motions:
-        embeddings = {name: spread.total(array) for name, array in self.embeddings.items()}
-        return Motions(embeddings, spread.total(self.sliding), spread.total(self.drift))
+    def _shared(self, motions: Motions) -> Motions:
+        embeddings = {name: self.spread.total(array) for name, array in motions.embeddings.items()}
+        return Motions(embeddings, self.spread.total(motions.sliding), self.spread.total(motions.drift))

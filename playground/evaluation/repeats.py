@@ -66,16 +66,26 @@ class Repeat:
         The FID of generated and of rebuilt motions is against the recorded windows they belong to, that of the
         recorded ones against other windows of the same clips.
         """
-        self.texts = self.passes.texts(self.items)
-        recorded, rebuilt = self.passes.recorded(self.items), self.passes.rebuilt(self.items)
+        recorded, real = self._recorded()
+        rebuilt = self.passes.rebuilt(self.items)
         tokens = self._tokens(rebuilt)
-        real = self._motions(recorded, self.passes.recorded(self.again))
         real |= _absent((*DRAWN, *TOKENS), "recorded motions are not made from a text or from tokens")
         reconstruction = self._motions(rebuilt.motions, recorded) | tokens
         reconstruction |= _absent(DRAWN, "a rebuilt motion is not drawn from a text")
         return {"metrics": self._generated(recorded) | tokens, "real": real, "reconstruction": reconstruction}
 
+    def sweep(self, scales: Sequence[float]) -> dict[str, Table]:
+        """{"real", and for every guidance scale g of the detokenizer a table named by it}; tokens are drawn once."""
+        recorded, real = self._recorded()
+        swept = self.passes.swept(self.items, scales)
+        return {"real": real} | {name_of(g): self._motions(m, recorded) for g, m in zip(scales, swept, strict=True)}
+
     # ---- tables ---------------------------------------------------------------------------------------------------
+
+    def _recorded(self) -> tuple[Motions, Table]:
+        self.texts = self.passes.texts(self.items)
+        recorded = self.passes.recorded(self.items)
+        return recorded, self._motions(recorded, self.passes.recorded(self.again))
 
     def _generated(self, recorded: Motions) -> Table:
         if self.passes.runtime.generator is None:
@@ -146,6 +156,11 @@ class Repeat:
 
     def _stream(self, what: int) -> np.random.Generator:
         return stream(self.plan.seed, self.number, what)
+
+
+def name_of(g: float) -> str:
+    """The name of a guidance scale in stored tables."""
+    return f"g={g:g}"
 
 
 def _entry(value: Value, n: int = 0) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from playground.engine import Engine, check_guidance, default_engine
 from playground.errors import PlaygroundError
 from playground.evaluation.items import measurable
 from playground.evaluation.passes import Passes
-from playground.evaluation.repeats import CLIP, MAIN, Plan, Repeat, summarise
+from playground.evaluation.repeats import CLIP, MAIN, Plan, Repeat, Table, summarise
 from playground.evaluation.spread import Spread, Tally
 from playground.evaluation.state import State, digest, state_path
 from playground.limits import LIMITS
@@ -88,11 +88,65 @@ def evaluate(
     order, spread, engine = order or Order(seed=seed), spread or Spread(), engine or default_engine()
     order.check()
     library = Library.open(Path(library_path))
-    chosen = library.split(split)
-    runtime = engine.runtime(system)
+    library.split(split)
     if not order.repeats:
-        return reconstruct(runtime, library, split, order.seed, progress) if spread.first else {}
-    clips = measurable(library, chosen)
+        return reconstruct(engine.runtime(system), library, split, order.seed, progress) if spread.first else {}
+    campaign = set_up(system, library, split, order, engine, spread)
+    base = reconstruct(engine.runtime(system), library, split, order.seed) if spread.first else {}
+    plan = Plan(order.seed, order.mm_texts, order.mm_samples)
+    motions = plan.motions(len(campaign.clips), campaign.passes.runtime.generator is not None)
+    repeats = campaign.repeat(
+        order, {"mm_texts": plan.mm_texts, "mm_samples": plan.mm_samples}, motions, progress,
+        lambda number: Repeat(campaign.passes, campaign.clips, plan, number).run(),
+    )  # fmt: skip
+    if not spread.first:
+        return {}
+    shown = {key: campaign.settings[key] for key in ("generator", "sampling", "evaluators")}
+    asked = {"repeats": order.repeats, "mm_texts": plan.mm_texts, "mm_samples": plan.mm_samples}
+    return base | asked | shown | {name: summarise([repeat[name] for repeat in repeats]) for name in TABLES}
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A system ready to be measured on some clips again and again. settings: what every number depends on."""
+
+    passes: Passes
+    clips: list[int]
+    settings: dict[str, Any]
+
+    def repeat(
+        self,
+        order: Order,
+        settings: dict[str, Any],
+        motions: int,
+        progress: Progress | None,
+        run: Callable[[int], dict[str, Table]],
+    ) -> list[dict[str, Table]]:
+        """Tables of order.repeats repeats, those of the state beside order.out included; every new one is added there.
+
+        settings: what the numbers depend on besides. motions: what a repeat works on, for the progress. run: number of
+        a repeat -> its tables. Processes but the first get what was computed now. PlaygroundError if the state is
+        another evaluation's.
+        """
+        spread = self.passes.spread
+        path = state_path(order.out) if order.out and spread.first else None
+        state = State(path, self.settings | settings)
+        done = spread.tell(len(state.repeats))
+        self.passes.tally = Tally(progress, (order.repeats - done) * motions // spread.size)
+        for number in range(done, order.repeats):
+            state.add(run(number))
+        return state.repeats[: order.repeats]
+
+
+def set_up(system: str, library: Library, split: str, order: Order, engine: Engine, spread: Spread) -> Campaign:
+    """Load everything; models go to this process's device, and the features of every caption are kept.
+
+    PlaygroundError if the system has no checkpoint or the split no clip that is long enough.
+    """
+    from playground.text.encoders import CachedEncoder
+
+    runtime = engine.runtime(system)
+    clips = measurable(library, library.split(split))
     evaluators = shipped_evaluators() if order.evaluators is None else order.evaluators
     sampling = order.sampling(system)
     settings = {
@@ -103,36 +157,13 @@ def evaluate(
         "clips": digest(library.path / "clips.jsonl"),
         "split": split,
         "seed": order.seed,
-        "mm_texts": order.mm_texts,
-        "mm_samples": order.mm_samples,
         "sampling": asdict(sampling),
         "evaluators": {name: one.hash[:12] for name, one in evaluators.items()},
     }
-    state = State(state_path(order.out) if order.out and spread.first else None, settings)
-    base = reconstruct(runtime, library, split, order.seed) if spread.first else {}
-    passes = make_passes(runtime, library, evaluators, sampling, spread)
-    _repeat(passes, clips, order, state, progress)
-    if not spread.first:
-        return {}
-    tables = {name: summarise([repeat[name] for repeat in state.repeats[: order.repeats]]) for name in TABLES}
-    shown = ("generator", "sampling", "evaluators", "mm_texts", "mm_samples")
-    return base | {"repeats": order.repeats} | {key: settings[key] for key in shown} | tables
-
-
-def make_passes(
-    runtime: "Runtime",
-    library: Library,
-    evaluators: dict[str, "Evaluator"],
-    sampling: SamplingDefaults,
-    spread: Spread,
-) -> Passes:
-    """The passes of a system on this process's device, which remember the features of every caption."""
-    from playground.text.encoders import CachedEncoder
-
     local = replace(runtime.to(spread.device), encoder=CachedEncoder(runtime.encoder, capacity=TEXTS_KEPT))
     drawing = asdict(sampling)
     guidance = drawing.pop("guidance")
-    return Passes(local, library, evaluators, guidance, drawing, spread)
+    return Campaign(Passes(local, library, evaluators, guidance, drawing, spread), clips, settings)
 
 
 def shipped_evaluators() -> dict[str, "Evaluator"]:
@@ -140,18 +171,6 @@ def shipped_evaluators() -> dict[str, "Evaluator"]:
     from playground.evaluation.evaluators import evaluator_path, load_evaluator
 
     return {name: load_evaluator(name) for name in (MAIN, CLIP) if evaluator_path(name).is_file()}
-
-
-def _repeat(passes: Passes, clips: list[int], order: Order, state: State, progress: Progress | None) -> None:
-    """Run the repeats that are not in the state yet."""
-    plan = Plan(order.seed, order.mm_texts, order.mm_samples)
-    done = passes.spread.tell(len(state.repeats))
-    motions = plan.motions(len(clips), passes.runtime.generator is not None)
-    passes.tally = Tally(progress, (order.repeats - done) * motions // passes.spread.size)
-    for number in range(done, order.repeats):
-        tables = Repeat(passes, clips, plan, number).run()
-        if passes.spread.first:
-            state.add(tables)
 
 
 def reconstruct(
