@@ -23,7 +23,7 @@ export function paintRow(ctx, track, row, frames, width, theme, alpha) {
     const rgb = cellColour(level, position, theme), marked = Boolean(level.marks?.[position]);
     ctx.fillStyle = css(rgb);
     fillCell(ctx, box);
-    ctx.fillStyle = css(textOn(rgb), marked ? 1 : 0.9);
+    ctx.fillStyle = css(textOn(rgb));
     if (written) ctx.fillText(String(level.ids[position]), from + wide / 2, row.y + row.height / 2 + 0.5);
     if (marked) paintMark(ctx, box);
   }
@@ -62,19 +62,22 @@ function fillCell(ctx, [x, y, w, h]) {
   ctx.fill();
 }
 
-// Slanted lines over a stretch: frames that stay as they were. origin keeps the lines of neighbours in step.
-export function paintHatch(ctx, x, y, w, h, color, gap = 7) {
+// Slanted lines over a stretch: frames that stay as they were. colors: of lines side by side, so that they show on
+// light and on dark cells.
+export function paintHatch(ctx, x, y, w, h, colors, gap = 7) {
   ctx.save();
   ctx.beginPath();
   ctx.rect(x, y, w, h);
   ctx.clip();
-  ctx.beginPath();
-  for (let at = x - h - ((x - h - y) % gap) - gap; at < x + w; at += gap) {
-    ctx.moveTo(at, y + h);
-    ctx.lineTo(at + h, y);
-  }
-  ctx.strokeStyle = color;
   ctx.lineWidth = 1;
-  ctx.stroke();
+  colors.forEach((color, beside) => {
+    ctx.beginPath();
+    for (let at = x - h - gap - ((x + y) % gap) + 1.4 * beside; at < x + w; at += gap) {
+      ctx.moveTo(at, y + h);
+      ctx.lineTo(at + h, y);
+    }
+    ctx.strokeStyle = color;
+    ctx.stroke();
+  });
   ctx.restore();
 }

@@ -43,7 +43,7 @@ export function readable(color, ground, ink) {
 
 // Dark or light text on a filled cell, whichever reads better.
 export function textOn(rgb) {
-  return luminance(rgb) > 0.19 ? [17, 18, 20] : [255, 255, 255];
+  return luminance(rgb) > 0.179 ? [0, 0, 0] : [255, 255, 255];
 }
 
 const NAMES = ["surface", "sunken", "line", "line-strong", "text", "muted", "ink", "on-ink", "focus"];

@@ -18,7 +18,9 @@ In the browser: MotionStage.get(name) has setPayload, busy, fail, setGuidance, s
 selectSpan, setSpanMode, getState, setState, snapshot, on, state. One name, one stage; stages in hidden tabs rest.
 
 Links: getState() -> {frame, scale, mode, selection, span, speed}; on("state", listener) tells of it once it has come to
-rest; setState(part of it) puts it back, before the first payload too, and passes over what does not fit.
+rest, and so does the DOM event "motion-stage-state" with detail {name, state}. setState(part of it) puts it back and
+passes over what does not fit. MotionStage.restore(name, state) does so at every result until the visitor does
+something, and may come before the stage; before MotionStage is there, push [name, state] to window.motionStageWishes.
 """
 
 import html
@@ -127,6 +129,7 @@ def stage_script() -> str:
         f"document.head.append(module_dom.el('style', {{ text: {style} }}));\n"
         "return { ...module_index, ...module_guidance };\n})();\n"
         "for (const slot of window.motionStageSlots || []) MotionStage.adoptScore(...slot);\n"
+        "for (const wish of window.motionStageWishes || []) MotionStage.restore(...wish);\n"
     )
 
 
@@ -163,7 +166,8 @@ MotionStage.mount(document.getElementById("stage"), document.getElementById("pay
 
 def stage_frame(payload: Json, title: str = "Motion stage", height: int = 320, room: int | None = None) -> str:
     """The page in an iframe, for IPython.display.HTML. room: height of the frame in CSS pixels; by default all fits."""
-    rows = sum(26 + 16 * len(track["levels"]) for track in payload.get("tracks", []))
+    rows = sum(36 + 16 * len(track["levels"]) for track in payload.get("tracks", []))
+    rows += sum(36 + (7 if strip["groups"] else 15) * len(strip["rows"]) for strip in payload.get("strips", []))
     page = html.escape(stage_page(payload, title, height), quote=True)
     tall = room or height + 130 + rows
     return f'<iframe title="{html.escape(title)}" srcdoc="{page}" style="width:100%;height:{tall}px;border:0"></iframe>'

@@ -34,7 +34,7 @@ export function keyLines(data) {
   if (levels.some((level) => level.entropy)) {
     lines.push(el(
       "span", { title: "Entropy of each token's distribution, as a share of the most that its codebook allows" },
-      "sure", el("i", { class: "ms-key-doubt" }), "unsure (paler: higher entropy)",
+      "sure", el("i", { class: "ms-key-doubt" }), "unsure (fainter: higher entropy)",
     ));
   }
   for (const track of data.tracks.filter(({ levels }) => levels.some((level) => level.marks))) {

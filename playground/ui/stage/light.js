@@ -5,7 +5,7 @@ import { css } from "./colour.js";
 import { cellEdges } from "./rows.js";
 import { governing, litToken, locate, tokenAt } from "./store.js";
 
-const SCRIM = 0.5; // how much of the ground lies over what is not governed, while a token is pointed at
+const SCRIM = 0.42; // how much of the ground lies over what is not governed, while a token is pointed at
 
 // view: {data, laid, width, theme, store}
 export function paintLight(ctx, view) {

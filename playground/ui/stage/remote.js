@@ -54,7 +54,8 @@ export class Remote {
   setState(wish) {
     if (!this.data) return void (this.wished = { ...this.wished, ...wish });
     this.wished = null;
-    this.store.set(fitting(wish, this.data));
+    const patch = fitting(wish, this.data);
+    this.store.set("frame" in patch ? { ...patch, playing: false } : patch);
   }
 
   // PNG of the figures with their names, as a data URL; null while there is nothing to see.

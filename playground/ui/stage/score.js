@@ -14,6 +14,7 @@ const GUTTER = 36; // pixels left of the roll, for the scales' numbers
 export const MARGIN = 14; // pixels right of it, so that the playhead's end is seen
 const NARROW = 9; // pixels: where the finest cell would be narrower than this,
 const WIDER = 13; // it gets this many, and the roll scrolls sideways inside itself
+const HATCH = ["rgba(17,18,20,0.34)", "rgba(255,255,255,0.2)"];
 
 export class Score {
   // onView is told which frames are in sight, [from, to], or null when all are.
@@ -108,7 +109,7 @@ export class Score {
       paintRow(ctx, data.tracks[row.track], row, data.frames, width, theme, alpha);
       for (const [from, to] of data.hatch) {
         const x = (from / data.frames) * width, end = Math.min(to, data.tracks[row.track].frames) / data.frames;
-        paintHatch(ctx, x, row.y, end * width - x, row.height, "rgba(17,18,20,0.34)");
+        paintHatch(ctx, x, row.y, end * width - x, row.height, HATCH);
       }
     }
     for (const place of laid.strips) {

@@ -74,8 +74,14 @@ export class Stage extends Remote {
         onSize: () => this.redraw("layout"),
         onTheme: () => this.redraw("theme"),
       }),
-      watchState(store, () => Boolean(this.timeline.drag), (state) => store.emit("state", state)),
+      watchState(store, () => Boolean(this.timeline.drag), (state) => this.tellState(state)),
     );
+  }
+
+  tellState(state) {
+    this.store.emit("state", state);
+    const detail = { name: this.options.name, state };
+    this.element.dispatchEvent(new CustomEvent("motion-stage-state", { bubbles: true, detail }));
   }
 
   // payload: object, JSON text, or null for the empty state. A message payload keeps the last result.
@@ -112,14 +118,16 @@ export class Stage extends Remote {
     if (scene !== this.scene) Object.assign(patch, { frame: 0, selection: null, span: null });
     this.scene = scene;
     this.store.set(patch);
-    if (this.wished) this.setState(this.wished);
+    const wish = this.wished || this.options.wish?.();
+    if (wish) this.setState(wish);
     this.figures.setData(data);
     this.score.setData(data);
     this.toolbar.fitTo(data);
     this.toolbar.show();
     this.notices.showBadge(data.badge);
     this.redraw("layout", "theme");
-    if (first && (this.options.autoplay ?? true) && !this.calm.matches) this.store.set({ playing: true });
+    const plays = (this.options.autoplay ?? true) && !this.calm.matches && wish?.frame === undefined;
+    if (first && plays) this.store.set({ playing: true });
   }
 
   // "loading" and "error" keep the last result; "empty" and "ready" end both.

@@ -73,7 +73,7 @@ export class Timeline {
       const [x, end] = [this.xOf(from), this.xOf(to)];
       ctx.fillStyle = css(theme.line);
       ctx.fillRect(x, BAR - 3, end - x, THICK + 6);
-      paintHatch(ctx, x, BAR - 3, end - x, THICK + 6, css(theme.lineStrong), 5);
+      paintHatch(ctx, x, BAR - 3, end - x, THICK + 6, [css(theme.lineStrong)], 5);
     }
     const lit = data && litToken(data.tracks, state);
     if (lit) {

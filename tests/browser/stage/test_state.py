@@ -70,6 +70,35 @@ def test_a_state_asked_for_before_the_result_waits_for_it(shown: Shown) -> None:
     assert shown.state("frame") == 0 and shown.state("selection") is None
 
 
+def test_a_links_state_holds_until_the_visitor_does_something(shown: Shown) -> None:
+    shown.call("MotionStage.restore('page', argument)", WISH)
+    assert shown.call("return stage.getState()") == WISH
+    later = scene.payload([scene.figure("later", "Later", walk()), *payload()["figures"]], payload()["tracks"])
+    shown.call("stage.setPayload(argument)", later)  # another scene, which the link still speaks of
+    assert shown.call("return stage.getState()") == WISH
+    shown.page.mouse.click(880, 620)
+    shown.call("stage.setPayload(argument)", payload())
+    assert shown.state("frame") == 0 and shown.state("selection") is None
+
+
+def test_a_stage_that_is_mounted_later_starts_where_the_link_says(shown: Shown) -> None:
+    state = shown.call(
+        "MotionStage.restore('other', argument[0]); const place = document.createElement('div');"
+        "document.body.append(place);"
+        "return MotionStage.mount(place, argument[1], { name: 'other' }).getState();",
+        [WISH, payload()],
+    )
+    assert state == WISH and not shown.page.evaluate("() => MotionStage.get('other').state.playing")
+
+
+def test_the_page_hears_of_the_state_as_an_event(shown: Shown) -> None:
+    shown.call("document.addEventListener('motion-stage-state', event => { window.bubbled = event.detail; })")
+    shown.page.get_by_role("button", name="2×").click()
+    shown.until("window.bubbled")
+    told = shown.page.evaluate("() => window.bubbled")
+    assert told["name"] == "page" and told["state"]["speed"] == 2
+
+
 def test_the_state_is_told_once_it_has_come_to_rest(shown: Shown) -> None:
     shown.call(TOLD)
     for frame in range(12):

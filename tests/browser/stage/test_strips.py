@@ -4,9 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from playground.figures.colors import TOKENS
 from playground.motion.skeleton import HUMAN22
+from playground.ui.stage.component import stage_frame
 from tests.browser.stage.scenes import ATTENTION, DIFFERENCE, MARKED, WORDS, Shown, payload, rich
 
 pytestmark = pytest.mark.browser
@@ -116,6 +118,15 @@ def test_kept_frames_are_hatched_on_the_axis_and_on_the_tokens(show: Show) -> No
         "return argument.map(f => ctx.getImageData(Math.round(stage.timeline.xOf(f)), 19, 1, 1).data[3])"
     )
     assert [alpha > 0 for alpha in with_hatch.call(axis, [6, 20, 40])] == [True, False, True]
+
+
+def test_a_notebooks_frame_is_as_tall_as_its_heat_maps_need(browser: Browser) -> None:
+    page = browser.new_page()
+    page.set_content(stage_frame(rich()))
+    page.frame_locator("iframe").get_by_text("kept as it was").wait_for()
+    tall = page.eval_on_selector("iframe", "e => [e.clientHeight, e.contentDocument.documentElement.scrollHeight]")
+    assert tall[1] <= tall[0] < tall[1] + 60
+    page.close()
 
 
 def test_a_strip_that_does_not_fill_its_rows_is_refused_in_one_sentence(show: Show) -> None:
