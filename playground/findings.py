@@ -201,6 +201,7 @@ class Edited:
     blend: int  # edited frames at each border that lean towards the kept side
     gap_m: float  # how far on the floor the edited frames missed the kept ones that follow, before `anchor` closed it
     gap_degrees: float  # and by how much they faced elsewhere
+    promise: str  # how it is guaranteed that kept frames stay as they were, in a sentence
     plain: Motion = field(repr=False)  # decoded from `levels` alone, nothing copied back
     plain_error_mm: float = 0.0  # pelvis-relative error of `plain` in the kept frames
     seconds: float = 0.0

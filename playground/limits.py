@@ -23,7 +23,12 @@ class Limits:
     max_temperature: float = 2.0
     max_json_bytes: int = 2 * 1024 * 1024  # size of a token file
     max_release_bytes: int = 4 * 1024**3  # size of a checkpoint of other authors, training state included
+    max_system_bytes: int = 40_000_000  # checkpoints of one shipped system
+    max_asset_bytes: int = 150_000_000  # everything that is shipped
     max_figures: int = 6  # figures on one stage
+    max_seeds: int = 6  # motions drawn from one prompt at once
+    max_listed: int = 64  # neighbours, alternatives or occurrences of a code that are listed
+    min_edit_frames: int = 4  # shortest run of frames that is drawn anew, and that must stay
     queue_size: int = 20  # visitors waiting for the model
     sessions: int = 200  # visitors whose open motion is kept in memory
     session_seconds: int = 3_600  # how long it is kept, and an uploaded file too
@@ -31,7 +36,6 @@ class Limits:
     max_link_chars: int = 4_000  # of an address that is read
     max_link_keys: int = 64
     max_picture_side: int = 1_920  # pixels of a rendered picture or film, the longer side
-    max_picture_frames: int = 200  # frames of a film
     picture_seconds: float = 120.0  # rendering one picture or film
 
 

@@ -13,7 +13,6 @@ from torch import Tensor
 
 from playground.errors import PlaygroundError
 from playground.generators.scalewise import Edit, redraw_masks
-from playground.motion.representation import from_features67
 from playground.nn.sampling import Sampling, filter_logits
 from playground.runtime import Runtime
 from playground.systems import SamplingDefaults
@@ -45,6 +44,12 @@ def total(parts: Sequence[Tensor]) -> Tensor:
     return out
 
 
+def subset(runtime: Runtime, levels: Sequence[LevelTokens], chosen: Sequence[int]) -> Tensor:
+    """Embedding [1, T, D] of some levels (from 0) alone; zeros if there are none."""
+    parts = shares(runtime, levels)
+    return total([parts[n] for n in chosen]) if chosen else torch.zeros_like(parts[0])
+
+
 @torch.no_grad()
 def replaced(runtime: Runtime, levels: Sequence[LevelTokens], level: int, ids: Ids) -> Tensor:
     """Embeddings [B, T, D] of one motion whose level `level` (from 0) holds other ids [B, s] in each row."""
@@ -53,18 +58,18 @@ def replaced(runtime: Runtime, levels: Sequence[LevelTokens], level: int, ids: I
     return total(parts)
 
 
-def decode_rows(
+def decode_many(
     runtime: Runtime, embeddings: Tensor, frames: int, caption: str, guidance: float = 0.0, check: Check = None
 ) -> Floats:
-    """Embeddings [B, T, D] of motions of one length -> un-normalised rows [B, F, 67]."""
-    rows = []
+    """Embeddings [B, T, D] of motions of one length -> normalised rows [B, F, 67]."""
+    features = []
     for part in embeddings.split(CHUNK):
         if check:
             check()
         text = runtime.texts([caption] * len(part)) if caption else None
         decoded = runtime.tokenizer.decode(part, torch.full((len(part),), frames), text, guidance)
-        rows.append(runtime.normaliser.invert(decoded.numpy()))
-    return np.concatenate(rows)
+        features.append(decoded.numpy())
+    return np.concatenate(features)
 
 
 def decode_edited(
@@ -182,8 +187,3 @@ def chances(logits: Tensor, how: SamplingDefaults) -> tuple[Floats, Floats]:
     else:
         drawn = filter_logits(logits.float() / how.temperature, how.top_k, how.top_p).softmax(dim=-1)
     return guided, drawn.numpy()
-
-
-def joints_of(rows: Floats) -> list[NDArray[np.float32]]:
-    """Un-normalised rows [B, F, 67] -> joints [F, 22, 3] of each motion."""
-    return [from_features67(one) for one in rows]

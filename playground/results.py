@@ -7,9 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from playground.motion.motion import Motion
+from playground.motion.representation import COLUMNS
+from playground.systems import SamplingDefaults
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 
 Floats = NDArray[np.float32]
+
+
+def _no_rows() -> Floats:
+    return np.zeros((0, COLUMNS), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +31,7 @@ class Tokenized:
     embedding: Floats  # [T, D], sum of all scales
     per_level: Floats  # [N, T, D], each scale's share
     seconds: float = 0.0
+    features: Floats = field(default_factory=_no_rows, repr=False)  # [F, 67] un-normalised rows; [0, 67] if not at hand
 
     def token_file(self) -> TokenFile:
         """The same tokens as a file that can be saved and decoded."""
@@ -39,8 +46,9 @@ class Decoded:
     features: Floats  # [F, 67], normalised
     mpjpe_mm: float | None  # pelvis-relative against the tokenized motion, where there is one
     guidance: float
-    scales: int
+    scales: int  # how many were used
     seconds: float = 0.0
+    subset: str = ""  # which ones: upto:7, only:3 or without:3
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +75,7 @@ class Generation:
     motion: Motion
     features: Floats = field(repr=False)  # [F, 67], normalised
     seconds: float = 0.0
+    sampling: SamplingDefaults = field(default_factory=SamplingDefaults)  # what it was drawn and decoded with
 
     @property
     def caption(self) -> str:

@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from playground.data.examples import ExampleStore, StoredExample
-from playground.engine.checks import check_generation, check_guidance, deadline_check, prepare
+from playground.engine.checks import check_generation, check_guidance, check_seeds, deadline_check, prepare, settings
+from playground.engine.generation import draw_steps, finish
 from playground.errors import PlaygroundError
+from playground.findings import ScaleSet
 from playground.limits import LIMITS
 from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
@@ -27,6 +29,7 @@ from playground.tokenizers.token_file import LevelTokens, TokenFile
 if TYPE_CHECKING:
     from playground.runtime import Runtime
 
+Scales = ScaleSet | int | str | None
 ASSETS = Path(__file__).resolve().parent.parent.parent / "assets"
 
 
@@ -59,11 +62,7 @@ class BaseEngine:
 
     def examples(self) -> list[Example]:
         """The example library; empty where none is shipped."""
-        folder = self.assets / "examples"
-        if not (folder / "index.json").is_file():
-            return []
-        stored = _open_examples(folder, (folder / "index.json").stat().st_mtime_ns)
-        return [self._example(entry) for entry in stored]
+        return [self._example(entry) for entry in self._stored_examples()]
 
     def runtime(self, system: str) -> "Runtime":
         """The loaded models of a system. PlaygroundError if it is unknown or its checkpoint is absent or broken."""
@@ -86,10 +85,11 @@ class BaseEngine:
         began = time.perf_counter()
         caption = normalise(caption, what="caption", allow_empty=True)
         features, cut = prepare(motion, self.heading(system))
-        levels, quantized = self.runtime(system).encode(features, caption)
+        runtime = self.runtime(system)
+        levels, quantized = runtime.encode(features, caption)
         return Tokenized(
             system=system,
-            checkpoint=self.runtime(system).checkpoint,
+            checkpoint=runtime.checkpoint,
             caption=caption,
             motion=replace(cut, caption=caption),
             levels=levels,
@@ -97,32 +97,41 @@ class BaseEngine:
             embedding=quantized.embedding,
             per_level=quantized.per_level,
             seconds=time.perf_counter() - began,
+            features=features,
         )
 
     def reconstruct(
-        self, tokenized: Tokenized, guidance: float = 0.0, scales: int | None = None, caption: str | None = None
+        self, tokenized: Tokenized, guidance: float = 0.0, scales: Scales = None, caption: str | None = None
     ) -> Decoded:
-        """The motion that the tokens stand for, and its error against the tokenized one."""
+        """The motion that the tokens stand for, and its error against the tokenized one. Arguments as in `decode`."""
         decoded = self.decode(tokenized.token_file(), caption, guidance, scales)
         return replace(decoded, mpjpe_mm=mpjpe(tokenized.motion.joints, decoded.motion.joints))
 
     def decode(
-        self, tokens: TokenFile, caption: str | None = None, guidance: float = 0.0, scales: int | None = None
+        self, tokens: TokenFile, caption: str | None = None, guidance: float = 0.0, scales: Scales = None
     ) -> Decoded:
-        """Decode a token file. caption None: the one in the file. scales: keep the coarsest so many, all by default.
+        """Decode a token file. caption None: the one in the file. scales: 3 keeps the three coarsest, "only:3" and
+        "without:3" (or a ScaleSet) one or all but one, None all.
 
-        PlaygroundError if the tokens belong to another system's shape or the guidance is out of range.
+        PlaygroundError if the tokens belong to another system's shape, the guidance is out of range or a scale is not
+        there.
         """
         began = time.perf_counter()
         check_guidance(guidance)
         runtime = self.runtime(tokens.system)
-        count = len(tokens.levels) if scales is None else scales
-        if not 1 <= count <= len(tokens.levels):
-            raise PlaygroundError(f"{scales} scales were asked for; 1 to {len(tokens.levels)} are accepted")
+        count = len(tokens.levels)
+        chosen = ScaleSet.of(scales, count)
         text = normalise(tokens.caption if caption is None else caption, what="caption", allow_empty=True)
-        features = runtime.decode(tokens.levels, tokens.frames, text, guidance, count)
+        if chosen.kind == "upto":
+            features = runtime.decode(tokens.levels, tokens.frames, text, guidance, chosen.scale)
+        else:
+            from playground.probes import subset
+
+            embedding = subset(runtime, tokens.levels, chosen.levels(count))
+            features = runtime.decode_embedding(embedding, tokens.frames, text, guidance)
         motion = Motion(from_features67(runtime.normaliser.invert(features)), caption=text)
-        return Decoded(motion, features, None, guidance, count, time.perf_counter() - began)
+        used = len(chosen.levels(count))
+        return Decoded(motion, features, None, guidance, used, time.perf_counter() - began, str(chosen))
 
     def guidance_pair(self, result: Tokenized | Generation, caption: str | None = None) -> GuidancePair:
         """Both branches of the detokenizer's guidance for a tokenized or generated motion."""
@@ -154,41 +163,48 @@ class BaseEngine:
 
         PlaygroundError for an empty prompt, a number out of range, or a run past the deadline (checked at every scale).
         """
-        text = None if prompt is None else normalise(prompt)
         asked = {"guidance": guidance, "cfg": cfg, "temperature": temperature, "top_k": top_k, "top_p": top_p}
-        given = {key: value for key, value in asked.items() if value is not None}
-        chosen = replace(row_of(system).sampling, **given)
-        frames = check_generation(seconds, seed, **asdict(chosen))
-        runtime = self.runtime(system)
-        check = deadline_check(deadline)
-        sampling = {"seed": seed, **asdict(chosen)}
-        guidance = sampling.pop("guidance")
-        entropy: list[NDArray[np.float32]] = []
-        for step in runtime.generate(text, frames, {**sampling, "check": check}):
-            entropy.append(step.entropy)
-            if not previews and step.level < len(self.scales(system)):
-                continue
-            features = runtime.decode_embedding(step.embedding, frames, text or "", guidance)
-            joints = from_features67(runtime.normaliser.invert(features))
-            yield GenerationStep(step.level, step.levels, tuple(entropy), Motion(joints, caption=text or ""), features)
+        steps = self.generate_many_steps(prompt, seconds, system, (seed,), deadline, previews, **asked)
+        yield from (step for (step,) in steps)
 
     def generate(
         self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, **options: Any
     ) -> Generation:
         """The finished motion; arguments as in `generate_steps`. The same seed gives the same tokens."""
+        return self.generate_many(prompt, seconds, system, (seed,), **options)[0]
+
+    def generate_many_steps(
+        self,
+        prompt: str | None,
+        seconds: float,
+        system: str = "lgtok-lite",
+        seeds: Sequence[int] = (0, 1, 2, 3),
+        deadline: float | None = LIMITS.deadline_seconds,
+        previews: bool = True,
+        **options: Any,
+    ) -> Iterator[tuple[GenerationStep, ...]]:
+        """As `generate_steps` for several seeds at once: a tuple, one step a seed, after every scale."""
+        text = None if prompt is None else normalise(prompt)
+        how = settings(row_of(system), options)
+        check_seeds(seeds)
+        frames = {check_generation(seconds, seed, **asdict(how)) for seed in seeds}.pop()
+        runtime = self.runtime(system)
+        yield from draw_steps(runtime, text, frames, seeds, how, deadline_check(deadline), previews=previews)
+
+    def generate_many(
+        self,
+        prompt: str | None,
+        seconds: float,
+        system: str = "lgtok-lite",
+        seeds: Sequence[int] = (0, 1, 2, 3),
+        **options: Any,
+    ) -> list[Generation]:
+        """The finished motions of several seeds, drawn together; each is what its seed gives alone, up to rounding."""
         began = time.perf_counter()
-        (last,) = self.generate_steps(prompt, seconds, system, seed, previews=False, **options)
-        return Generation(
-            system=system,
-            checkpoint=self.runtime(system).checkpoint,
-            prompt=last.motion.caption,
-            seed=seed,
-            levels=last.levels,
-            entropy=last.entropy,
-            motion=last.motion,
-            features=last.features,
-            seconds=time.perf_counter() - began,
-        )
+        (last,) = self.generate_many_steps(prompt, seconds, system, seeds, previews=False, **options)
+        options.pop("deadline", None)
+        how, runtime = settings(row_of(system), options), self.runtime(system)
+        return [finish(runtime, step, seed, how, began) for step, seed in zip(last, seeds, strict=True)]
 
     # ---- inside ---------------------------------------------------------------------------------------------------
 
@@ -200,6 +216,12 @@ class BaseEngine:
             raise PlaygroundError(row.absent)
         config: dict[str, Any] = json.loads(head["__metadata__"]["config"])
         return config
+
+    def _stored_examples(self) -> tuple[StoredExample, ...]:
+        folder = self.assets / "examples"
+        if not (folder / "index.json").is_file():
+            return ()
+        return _open_examples(folder, (folder / "index.json").stat().st_mtime_ns).examples
 
     def _example(self, entry: StoredExample) -> Example:
         source: Callable[[], Motion] = entry.motion if entry.joints is not None else partial(self._decoded, entry)

@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from playground.limits import LIMITS
 from playground.motion.motion import Motion
 from playground.motion.representation import canonicalise, to_features67
 from playground.motion.skeleton import HUMAN22
+from playground.systems import SamplingDefaults, SystemRow
 from playground.tokenizers.token_file import LevelTokens
 
 UNIT = 4  # frames: motions are floored to a multiple of it, as in the published evaluation (A2)
@@ -79,6 +81,25 @@ def whole(value: object, what: str, low: int, high: int) -> int:
     if not low <= number <= high:
         raise PlaygroundError(f"{what} is {number}; {low} to {high} is accepted")
     return number
+
+
+def check_seeds(seeds: Sequence[int]) -> None:
+    """PlaygroundError unless there are 1 to LIMITS.max_seeds seeds, each different."""
+    if not 1 <= len(seeds) <= LIMITS.max_seeds or len(set(seeds)) != len(seeds):
+        raise PlaygroundError(f"1 to {LIMITS.max_seeds} different seeds are drawn together, got {len(seeds)}")
+
+
+def settings(row: SystemRow, options: dict[str, Any]) -> SamplingDefaults:
+    """A system's sampling with the given numbers in place of its own; None means its own.
+
+    PlaygroundError for a name that is no setting.
+    """
+    given = {key: value for key, value in options.items() if value is not None}
+    try:
+        return replace(row.sampling, **given)
+    except TypeError:
+        names = ", ".join(field.name for field in fields(SamplingDefaults))
+        raise PlaygroundError(f"{', '.join(sorted(given))[:80]} were given; {names} are accepted") from None
 
 
 def check_place(levels: Sequence[LevelTokens], scale: int, position: int) -> tuple[int, int]:
