@@ -197,7 +197,7 @@ class Passes:
 
         generator = self.runtime.generator
         assert generator is not None
-        text = self.runtime.texts([i.caption for i in batch])
+        text = self.runtime.texts([i.caption for i in batch], prompts=True)
         lengths = torch.tensor([i.rows for i in batch], device=self.runtime.device)
         logits = generator.logits(tokens, text, lengths)
         true = [
