@@ -190,7 +190,9 @@ class EvaluatorTask:
 
     def export(self, path: Path, facts: dict[str, Any]) -> None:
         """Write the shipped form of the evaluator, with its retrieval figures on the test split."""
-        facts = facts | {"seed": self.config.seed, "split": "test", "retrieval": self._retrieval("test")}
+        c = self.config
+        facts = facts | {"seed": c.seed, "batch": c.batch.size, "alike": c.alike}
+        facts |= {"split": "test", "retrieval": self._retrieval("test")}
         who = identify(self.encoder)
         card = Card("evaluator", self.network.config, who, self.data, facts, self.batches.normaliser)
         save_checkpoint(path, self.network, card)

@@ -82,7 +82,7 @@ def test_reconstruction_equals_a_loop_over_frames():
 
 def test_one_process_gathers_itself():
     rows = torch.ones(2, 3, requires_grad=True)
-    assert gathered(rows) is rows and float(shared(rows.sum())) == 6.0
+    assert gathered(rows) is rows and shared(rows.sum()).item() == 6.0
 
 
 # ---- runs ---------------------------------------------------------------------------------------------------------
@@ -126,7 +126,8 @@ def test_a_run_killed_and_resumed_has_the_losses_of_one_that_never_stopped(libra
         losses(library, tmp_path / "broken")
     assert len(whole) == 4 and losses(library, tmp_path / "broken", resume=True) == whole[2:]
     evaluator, card = open_evaluator(tmp_path / "whole" / kind / "checkpoint.safetensors", kind)
-    assert card.data == "tiny library" and card.facts["step"] == 4 and card.facts["split"] == "test"
+    assert card.data == "tiny library" and card.facts["step"] == 4 and card.facts["batch"] == 4
+    assert card.facts["split"] == "test" and card.facts["seed"] == 0
     assert card.facts["retrieval"]["n"] == 34 and set(card.facts["retrieval"]) == {"n", "repeats", "seed", "pool32"}
     assert evaluator.embed_texts(["walks left 3"]).shape == (1, 12)
     opened = Library.open(library)
