@@ -164,6 +164,16 @@ def _for_data(command: Command) -> None:
     sub.add_argument("root", metavar="ROOT", nargs="?", type=Path, help="the folder of the data; none for deepmimic")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="the library to write")
 
+    sub = command("convert", commands.convert, "the files that other authors release to checkpoints")
+    sub.add_argument("family", metavar="FAMILY", choices=("lgtok",), help="lgtok: the authors' release of LG-Tok")
+    sub.add_argument("--tokenizer", type=Path, required=True, metavar="FILE", help="weights of the tokenizer (.tar)")
+    sub.add_argument("--generator", type=Path, required=True, metavar="FILE", help="weights of the generator (.tar)")
+    sub.add_argument("--options", type=Path, required=True, metavar="FILE", help="options of the tokenizer (opt.txt)")
+    sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="the checkpoints to write")
+    sub.add_argument("--statistics", type=Path, metavar="DIR", help="folder with Mean.npy and Std.npy (the data set's)")
+    sub.add_argument("--llama", metavar="DIR", help="folder of LLaMA-3.2-1B, to note which weights are meant")
+    sub.add_argument("--clip", metavar="DIR", help="folder of CLIP ViT-B/32, likewise")
+
     sub = command("train", commands.train, "train a tokenizer or a generator")
     sub.add_argument("config", metavar="CONFIG", help="a named training run, such as lgtok-lite-tokenizer")
     sub.add_argument("--library", type=Path, required=True, metavar="DIR")

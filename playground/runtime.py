@@ -65,7 +65,7 @@ class Runtime:
 
     def prompt(self, prompt: str) -> TextFeatures | None:
         """Features of a prompt for the generator; None for the empty one."""
-        return (self.prompt_encoder or self.encoder).encode([prompt]) if prompt else None
+        return self._prompt_encoder.encode([prompt]) if prompt else None
 
     def codebooks(self) -> list[Floats]:
         """Code vectors [V, D] of every scale."""
@@ -124,7 +124,7 @@ class Runtime:
         """
         if any(captions) != all(captions):
             raise PlaygroundError("a batch holds captions or none; some of these are empty")
-        encoder = (self.prompt_encoder if prompts else None) or self.encoder
+        encoder = self._prompt_encoder if prompts else self.encoder
         return encoder.encode(captions).to(self.device) if any(captions) else None
 
     def generate_batch(
@@ -148,6 +148,10 @@ class Runtime:
         lengths = torch.tensor(frames, device=self.device)
         decoded = self.tokenizer.decode(embedding, lengths, self.texts(captions), guidance).cpu().numpy()
         return [self.normaliser.invert(rows[:count]) for rows, count in zip(decoded, frames, strict=True)]
+
+    @property
+    def _prompt_encoder(self) -> CachedEncoder:
+        return self.encoder if self.prompt_encoder is None else self.prompt_encoder
 
     @property
     def device(self) -> torch.device:
