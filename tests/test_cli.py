@@ -88,6 +88,14 @@ BAD_CALLS = {
     "evaluate an unknown system": ["evaluate", "gpt", "--library", "lib"],
     "evaluate on no library": ["evaluate", "lgtok-lite", "--library", "."],
     "evaluate an unknown split": ["evaluate", "lgtok-lite", "--library", "lib", "--split", "dev"],
+    "repeats below zero": ["evaluate", "lgtok-lite", "--library", "lib", "--repeats", "-1"],
+    "repeats of words": ["evaluate", "lgtok-lite", "--library", "lib", "--repeats", "many"],
+    "a million texts": ["evaluate", "lgtok-lite", "--library", "lib", "--mm-texts", "1000000"],
+    "samples below zero": ["evaluate", "lgtok-lite", "--library", "lib", "--mm-samples", "-3"],
+    "evaluate with a seed too large": ["evaluate", "lgtok-lite", "--library", "lib", "--seed", "99999999999"],
+    "evaluate with guidance too high": ["evaluate", "lgtok-lite", "--library", "lib", "--guidance", "100"],
+    "evaluate with a cfg that is no number": ["evaluate", "lgtok-lite", "--library", "lib", "--cfg", "nan"],
+    "evaluate without a library": ["evaluate", "lgtok-lite", "--repeats", "1"],
     "bench into a folder": ["bench", "--json", "."],
 }
 

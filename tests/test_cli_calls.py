@@ -173,6 +173,24 @@ def test_evaluate(library: Path, folder: Path) -> None:
     )
 
 
+def test_evaluate_everything_and_once_more(library: Path, folder: Path) -> None:
+    out = folder / "whole.json"
+    words = ("evaluate", SYSTEM, "--library", library, "--mm-texts", "1", "--mm-samples", "10", "--json", out)
+    run(*words, "--repeats", "1", "--seed", "2")
+    result = json.loads(out.read_text())
+    assert (result["repeats"], result["seed"], result["mm_texts"], result["mm_samples"]) == (1, 2, 1, 10)
+    for table in ("metrics", "real", "reconstruction"):
+        for entry in result[table].values():
+            assert entry["mean"] is not None or entry["why"]
+    assert result["metrics"]["prompts_obeyed"]["n"] == 24 and result["metrics"]["usage"]["mean"] > 0
+    state = out.with_name("whole.state.json")
+    before = state.read_text()
+    call(*words, "--repeats", "1", "--seed", "2")
+    assert json.loads(out.read_text()) == result and state.read_text() == before
+    _, err = call(*words, "--repeats", "1", "--seed", "3", status=2)
+    assert "another seed" in err.splitlines()[-1]
+
+
 def test_train_stops_and_goes_on(library: Path, folder: Path) -> None:
     out = folder / "run"
     words = ("train", f"{SYSTEM}-tokenizer", "--library", library, "--out", out)
