@@ -21,8 +21,11 @@ SYSTEM_NAME ?= lgtok-lite
 LIBRARY ?= library
 RUNS ?= runs
 DATA ?= $(PLAYGROUND_DATA)
+SIZE ?= cpu
+MINUTES ?=
+QUEUE = --library $(LIBRARY) --size $(SIZE) $(if $(MINUTES),--minutes $(MINUTES))
 
-.PHONY: help setup app test notebooks train bench lint format screenshots clean
+.PHONY: help setup app test notebooks train family ablations bench lint format screenshots clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 24
@@ -47,10 +50,18 @@ format: $(DEV) ## let ruff format the code
 notebooks: $(DEV) ## execute every notebook in place
 	$(BIN)/jupyter execute --inplace --timeout=1800 notebooks/*.ipynb
 
-train: $(DEV) ## train SYSTEM_NAME: its tokenizer, then its generator; goes on where it stopped (DATA=folder makes LIBRARY)
-	test -f $(LIBRARY)/library.json || $(BIN)/python -m playground prepare joints-npz $(DATA) --out $(LIBRARY)
+$(LIBRARY)/library.json: | $(DEV)
+	$(BIN)/python -m playground prepare joints-npz $(DATA) --out $(LIBRARY)
+
+train: $(DEV) $(LIBRARY)/library.json ## train SYSTEM_NAME: its tokenizer, then its generator; goes on where it stopped (DATA=folder makes LIBRARY)
 	$(BIN)/python -m playground train $(SYSTEM_NAME)-tokenizer --library $(LIBRARY) --out $(RUNS)/$(SYSTEM_NAME) --resume
 	$(BIN)/python -m playground train $(SYSTEM_NAME)-generator --library $(LIBRARY) --out $(RUNS)/$(SYSTEM_NAME) --resume
+
+family: $(DEV) $(LIBRARY)/library.json ## train the LG-Tok family, what is missing of it (SIZE=cpu or gpu, MINUTES=n); stops and goes on at will
+	$(BIN)/python -m playground.training.train_family $(QUEUE)
+
+ablations: $(DEV) $(LIBRARY)/library.json ## train and measure the ablations, one after another (SIZE, MINUTES); stops and goes on at will
+	$(BIN)/python -m playground.training.ablations $(QUEUE)
 
 bench: $(RUNTIME) ## measure speed and memory
 	$(BIN)/python -m playground bench

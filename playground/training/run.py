@@ -8,12 +8,12 @@ from typing import Any
 
 import torch
 
-from playground.checkpoints import load_tokenizer
+from playground.checkpoints import load_generator, load_tokenizer
 from playground.data.batches import BatchConfig, BatchSource, library_samples, synthetic_samples, whole_batches
 from playground.data.library import Library
 from playground.errors import PlaygroundError
 from playground.evaluation.networks import build_evaluator
-from playground.generators.scalewise import GeneratorConfig, build_generator
+from playground.generators.scalewise import GeneratorConfig, ScalewiseGenerator, build_generator
 from playground.motion.representation import Normaliser
 from playground.motion.synthetic import corpus
 from playground.progress import Progress
@@ -23,9 +23,11 @@ from playground.tokenizers.transformer import LGTok, build_tokenizer
 from playground.training.configs import (
     EVALUATORS,
     GENERATORS,
+    REFITS,
     TOKENIZERS,
     EvaluatorTraining,
     GeneratorTraining,
+    RefitTraining,
     TokenizerTraining,
     with_steps,
 )
@@ -33,9 +35,10 @@ from playground.training.evaluator import EvaluatorTask
 from playground.training.family import FAMILY, SIZES
 from playground.training.generator import GeneratorTask, build_bank
 from playground.training.loop import Fit, Launch, Task, fit, start_fabric
+from playground.training.refit import RefitTask, build_refit_bank
 from playground.training.tokenizer import TokenizerTask
 
-Training = TokenizerTraining | GeneratorTraining | EvaluatorTraining
+Training = TokenizerTraining | GeneratorTraining | RefitTraining | EvaluatorTraining
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def find_training(name: str, size: str = "cpu") -> Training:
     """The training with that name. PlaygroundError for an unknown name or size."""
     if size not in SIZES:
         raise PlaygroundError(f"unknown size {size!r}; accepted: {', '.join(SIZES)}")
-    known: dict[str, Training] = {**FAMILY[size], **TOKENIZERS, **GENERATORS, **EVALUATORS}
+    known: dict[str, Training] = {**FAMILY[size], **TOKENIZERS, **GENERATORS, **REFITS, **EVALUATORS}
     if name not in known:
         raise PlaygroundError(f"unknown training {name!r}; known are {', '.join(known)}")
     return known[name]
@@ -98,7 +101,16 @@ def run_training(training: Training, order: Order) -> dict[str, Any]:
         return _train_tokenizer(training, order)
     if isinstance(training, GeneratorTraining):
         return _train_generator(training, order)
+    if isinstance(training, RefitTraining):
+        return _train_refit(training, order)
     return _train_evaluator(training, order)
+
+
+def part_of(training: Training) -> str:
+    """The folder of a run inside its output folder."""
+    if isinstance(training, EvaluatorTraining):
+        return training.model.kind
+    return "tokenizer" if isinstance(training, TokenizerTraining) else "generator"
 
 
 def training_batches(
@@ -117,7 +129,7 @@ def training_batches(
 
 
 def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
-    library, out = Library.open(order.library), order.out / "tokenizer"
+    library, out = Library.open(order.library), order.out / part_of(config)
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
     batches = training_batches(library, config, library.normaliser, fabric.device)
@@ -137,7 +149,7 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
     if not tokenizer_path.is_file():
         raise PlaygroundError(f"{tokenizer_path} is absent; train {config.tokenizer} into the same folder first")
     tokenizer, card = load_tokenizer(tokenizer_path)
-    library, out = Library.open(order.library), order.out / "generator"
+    library, out = Library.open(order.library), order.out / part_of(config)
     normaliser = card.normaliser or library.normaliser
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
@@ -161,8 +173,33 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
     return order.fit(fabric, task, config, out)
 
 
+def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
+    paths = [order.out / part / "checkpoint.safetensors" for part in ("tokenizer", "generator")]
+    if not all(path.is_file() for path in paths):
+        raise PlaygroundError(f"{order.out} holds no trained tokenizer and generator; train both there first")
+    frozen, card = load_tokenizer(paths[0])
+    network, generator_card = load_generator(paths[1])
+    library, out = Library.open(order.library), order.out / "refit"
+    normaliser = card.normaliser or library.normaliser
+    fabric = start_fabric(order.launch, out)
+    encoder = load_encoder(config.text)
+    check_same(card.encoder, encoder)
+    batches = training_batches(library, config, normaliser, fabric.device)
+    held_out = library_samples(library, "val")
+    texts = [*batches.captions(), *(caption for sample in held_out for caption in sample.captions), ""]
+    store = FeatureStore.cached(order.library, texts, encoder).to(fabric.device)
+    frozen, network = frozen.to(fabric.device), network.to(fabric.device)
+    with Progress("drawing tokens of the training clips") as progress:
+        bank = build_refit_bank(ScalewiseGenerator(network, frozen.quantizer), frozen, batches, store, config, progress)
+    model = build_tokenizer(card.config)
+    model.load_state_dict(frozen.state_dict(), strict=False)
+    validation = whole_batches(held_out, normaliser, config.batch.size) if held_out else []
+    task = RefitTask(model, config, bank, batches, validation, store, card, (network, generator_card), fabric.device)
+    return order.fit(fabric, task, config, out)
+
+
 def _train_evaluator(config: EvaluatorTraining, order: Order) -> dict[str, Any]:
-    library, out = Library.open(order.library), order.out / config.model.kind
+    library, out = Library.open(order.library), order.out / part_of(config)
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
     clips = library.split("train") or list(range(len(library)))

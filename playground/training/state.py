@@ -26,6 +26,18 @@ def save_state(path: Path, model: nn.Module, optimizer: torch.optim.Optimizer, f
     os.replace(partial, path)
 
 
+def read_facts(path: Path) -> dict[str, Any]:
+    """The facts of a saved state without its weights; {} where there is none. PlaygroundError if it is broken."""
+    if not path.is_file():
+        return {}
+    try:
+        with safe_open(str(path), framework="pt") as file:
+            facts: dict[str, Any] = json.loads((file.metadata() or {})["facts"])
+        return facts
+    except (OSError, SafetensorError, KeyError, ValueError) as error:
+        raise PlaygroundError(f"{path} is not a state of a run; delete it or choose another folder") from error
+
+
 def load_state(path: Path, model: nn.Module, optimizer: torch.optim.Optimizer) -> dict[str, Any]:
     """Put a saved state back; returns its facts. PlaygroundError if the file is broken or of another model."""
     try:

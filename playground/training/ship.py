@@ -1,0 +1,116 @@
+"""Put a finished run into the assets: `python -m playground.training.ship RUN --system NAME`. Nothing else does that.
+
+RUN holds tokenizer/checkpoint.safetensors and, for a system that generates, generator/checkpoint.safetensors, as the
+train command leaves them: float16, self-describing. Everything is checked before the first byte is copied.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from safetensors import safe_open
+
+from playground.checkpoints import Card, load_generator, load_tokenizer
+from playground.engine import ASSETS
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+from playground.systems import checkpoint_path, row_of
+from playground.training.queue import guarded, say
+
+PARTS = ("tokenizer", "generator")
+
+
+def ship(run: Path, system: str, assets: Path = ASSETS) -> list[str]:
+    """Copy the checkpoints of a run to the files of a system; returns what was done, a line each.
+
+    PlaygroundError if the system is unknown, a file is absent, broken, not float16 or not finite, the generator belongs
+    to another tokenizer, or a size would pass its limit; the assets are then as before.
+    """
+    row = row_of(system)
+    found = {part: run / part / "checkpoint.safetensors" for part in PARTS}
+    if not found["tokenizer"].is_file():
+        raise PlaygroundError(f"{found['tokenizer']} is absent; train the tokenizer of {system} into {run} first")
+    if row.generator is None or not found["generator"].is_file():
+        del found["generator"]
+    cards = _checked(found)
+    old = {part: checkpoint_path(assets, system, part) for part in PARTS}
+    sizes = sum(path.stat().st_size for path in found.values())
+    if sizes > LIMITS.max_system_bytes:
+        raise PlaygroundError(f"{run} holds {_mb(sizes)}; a system may have {_mb(LIMITS.max_system_bytes)}")
+    stays = sum(p.stat().st_size for p in assets.rglob("*") if p.is_file() and p not in old.values())
+    if stays + sizes > LIMITS.max_asset_bytes:
+        raise PlaygroundError(
+            f"{assets} would hold {_mb(stays + sizes)}, at most {_mb(LIMITS.max_asset_bytes)} are accepted; ship less"
+        )
+    notes = []
+    for part, path in found.items():
+        _copy(path, old[part])
+        facts = cards[part].facts
+        notes.append(f"{old[part]}: {_mb(path.stat().st_size)}, step {facts.get('step')}, {cards[part].hash[:12]}")
+    if "generator" not in found and old["generator"].is_file():
+        old["generator"].unlink()
+        notes.append(f"{old['generator']}: removed, it drew the tokens of another tokenizer")
+    return [*notes, f"{assets}: {_mb(stays + sizes)} of {_mb(LIMITS.max_asset_bytes)}"]
+
+
+def _checked(found: dict[str, Path]) -> dict[str, Card]:
+    """The cards of the files, read whole. PlaygroundError for what is wrong with them."""
+    cards = {"tokenizer": load_tokenizer(found["tokenizer"])[1]}
+    if cards["tokenizer"].normaliser is None:
+        raise PlaygroundError(f"{found['tokenizer']} carries no normaliser; it is not a finished tokenizer checkpoint")
+    if "generator" in found:
+        cards["generator"] = load_generator(found["generator"])[1]
+        if cards["generator"].facts.get("tokenizer") != cards["tokenizer"].hash[:12]:
+            raise PlaygroundError(
+                f"{found['generator']} was trained on the tokens of another tokenizer; train it again"
+            )
+    for path in found.values():
+        with safe_open(str(path), framework="pt") as file:
+            for name in file.keys():  # noqa: SIM118
+                if not name.startswith("model."):
+                    continue
+                weights = file.get_tensor(name)
+                if str(weights.dtype) != "torch.float16":
+                    raise PlaygroundError(f"{path} holds {name} as {weights.dtype}; what is shipped is float16")
+                if not bool(weights.isfinite().all()):
+                    raise PlaygroundError(f"{path} holds numbers in {name} that are not finite; train it again")
+    return cards
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Whole or not at all."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    partial = target.with_suffix(".partial")
+    try:
+        shutil.copyfile(source, partial)
+        os.replace(partial, target)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _mb(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command; returns its exit status."""
+    about = (__doc__ or "").splitlines()[0]
+    parser = argparse.ArgumentParser(prog="python -m playground.training.ship", description=about)
+    parser.add_argument("run", type=Path, metavar="RUN", help="the folder that holds tokenizer/ and generator/")
+    parser.add_argument("--system", required=True, metavar="NAME", help="a name of the table of systems")
+    parser.add_argument("--assets", type=Path, default=ASSETS, metavar="DIR", help="other assets than the repository's")
+    options = parser.parse_args(arguments)
+
+    def run() -> None:
+        for note in ship(options.run, options.system, options.assets):
+            say(note)
+        say("next: python -m playground.analysis.store and python -m playground.ui.opening, which follow the files")
+
+    return guarded(run)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
