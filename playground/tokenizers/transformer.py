@@ -354,9 +354,14 @@ class LGTok(nn.Module):
         """One training pass: encode, quantize with straight-through gradients, decode. dropped: bool [B], no text."""
         z = self.latents(features, lengths, text, dropped)
         quantized = self.quantizer(z)
-        memory = self._memory(len(lengths), text, dropped)
-        out = self._detokenize(quantized.embedding.to(z.dtype), lengths, memory, features.shape[1])
+        out = self.detokenize(quantized.embedding.to(z.dtype), lengths, text, dropped, features.shape[1])
         return TrainingOutput(out, quantized.commitment, quantized.ids)
+
+    def detokenize(
+        self, embedding: Tensor, lengths: Tensor, text: TextFeatures | None, dropped: Tensor | None, frames: int
+    ) -> Tensor:
+        """The second half of a training pass: embedding [B, T, code width] -> features [B, frames, C]."""
+        return self._detokenize(embedding, lengths, self._memory(len(lengths), text, dropped), frames)
 
 
 def _build_stack(c: TokenizerConfig, memories: int) -> UStack:

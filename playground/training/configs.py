@@ -83,6 +83,34 @@ GENERATORS: dict[str, GeneratorTraining] = {
 
 
 @dataclass(frozen=True)
+class RefitTraining:
+    """One refit of a detokenizer on imperfect tokens (training/refit.py); ours, not in the paper."""
+
+    tokenizer_training: TokenizerTraining  # the run whose losses are used
+    batch: BatchConfig
+    schedule: Schedule = field(default_factory=Schedule)
+    variants: int = 2  # windows of every clip
+    text: str = "minilm"
+    synthetic: float = 0.1
+    language_drop: float = 0.1
+    velocity: float = 1.0  # weight of smoothL1 on differences of successive rows
+    redrawn: float = 0.45  # share of motions whose fine scales the generator drew anew
+    coarse: float = 0.2  # share of motions of which the coarse scales alone are given
+    true_scales: int = 3  # at least so many scales are true
+    cfg: float = 3.0  # guidance of the generator
+    seed: int = 0
+
+
+REFITS: dict[str, RefitTraining] = {
+    "lgtok-lite-refit": RefitTraining(
+        tokenizer_training=TOKENIZERS["lgtok-lite-tokenizer"],
+        batch=BatchConfig(size=32, whole=0.8, source_balance=0.5, action_balance=0.3),
+        schedule=Schedule(steps=1_500, rate=5e-4, warmup=100, fall=0.5),
+    ),
+}
+
+
+@dataclass(frozen=True)
 class EvaluatorTraining:
     """One evaluator run (systems.md E5, F1); the size of the contrastive batch is `batch.size` (LG-Tok, Table 6)."""
 

@@ -123,17 +123,7 @@ class TokenizerTask:
 
     def validate(self) -> dict[str, float]:
         """MPJPE in mm on the validation split, over clips and as a mean over sources, true captions, g = 0."""
-        errors: dict[str, list[float]] = {}
-        for batch in self.validation:
-            features, lengths, text = self._tensors(batch)
-            decoded = self.tokenizer.decode(self.tokenizer.encode(features, lengths, text).embedding, lengths, text)
-            for row, (length, source) in enumerate(zip(batch.lengths.tolist(), batch.sources, strict=True)):
-                error = clip_error(features[row, :length], decoded[row, :length], self.batches.normaliser)
-                errors.setdefault(source, []).append(error)
-        means = {source: float(np.mean(values)) for source, values in errors.items()}
-        everything = [value for values in errors.values() for value in values]
-        figures = {"mpjpe_mm": float(np.mean(everything)), "mpjpe_mm_source_mean": float(np.mean(list(means.values())))}
-        return figures | {f"mpjpe_mm {source}": value for source, value in sorted(means.items())}
+        return reconstruction_errors(self.tokenizer, self.validation, self.texts, self.batches.normaliser, self.device)
 
     def export(self, path: Path, facts: dict[str, Any]) -> None:
         """Write the shipped form of the tokenizer."""
@@ -146,6 +136,24 @@ class TokenizerTask:
             normaliser=self.batches.normaliser,
         )
         save_checkpoint(path, self.tokenizer, card)
+
+
+def reconstruction_errors(
+    tokenizer: LGTok, batches: list[Batch], texts: FeatureStore, normaliser: Normaliser, device: torch.device
+) -> dict[str, float]:
+    """MPJPE in mm of whole clips, over clips, as a mean over sources and of each source; true captions, g = 0."""
+    errors: dict[str, list[float]] = {}
+    for batch in batches:
+        features, lengths = batch.features.to(device), batch.lengths.to(device)
+        text = texts.lookup(batch.captions)
+        decoded = tokenizer.decode(tokenizer.encode(features, lengths, text).embedding, lengths, text)
+        for row, (length, source) in enumerate(zip(batch.lengths.tolist(), batch.sources, strict=True)):
+            error = clip_error(features[row, :length], decoded[row, :length], normaliser)
+            errors.setdefault(source, []).append(error)
+    means = {source: float(np.mean(values)) for source, values in errors.items()}
+    everything = [value for values in errors.values() for value in values]
+    figures = {"mpjpe_mm": float(np.mean(everything)), "mpjpe_mm_source_mean": float(np.mean(list(means.values())))}
+    return figures | {f"mpjpe_mm {source}": value for source, value in sorted(means.items())}
 
 
 def clip_error(features: Tensor, decoded: Tensor, normaliser: Normaliser) -> float:
