@@ -57,7 +57,7 @@ export class Painter {
     this.order.sort((a, b) => b.depth - a.depth);
   }
 
-  // halo: colour of a broad line round the body, or null; plain: one shade a shape, where time is short.
+  // halo: colour of a broad line round the body, or null; plain: one shade a shape and no rims, where time is short.
   paint(ctx, screen, focal, tones, { halo = null, plain = false } = {}) {
     this.measure(screen, focal);
     ctx.lineJoin = "bevel"; // hulls turn so little at each corner that it does not show
@@ -67,9 +67,11 @@ export class Painter {
     ctx.strokeStyle = tones.inner;
     ctx.lineWidth = 1.5;
     for (const shape of this.order) {
-      ctx.beginPath();
-      for (const part of shape.parts) traceRim(ctx, part);
-      ctx.stroke();
+      if (!plain) {
+        ctx.beginPath();
+        for (const part of shape.parts) traceRim(ctx, part);
+        ctx.stroke();
+      }
       ctx.beginPath();
       for (const part of shape.parts) trace(ctx, part.points);
       ctx.fillStyle = plain ? tones[shape.tone][1] : light(ctx, shape.parts, tones[shape.tone]);

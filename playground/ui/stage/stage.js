@@ -20,6 +20,7 @@ import { Toolbar } from "./toolbar.js";
 
 const UNREADABLE = "This result cannot be shown: it is not readable.";
 const PHONE = 520; // CSS pixels: in a narrower picture two rows of figures get more height
+const ONE_LINE = 660; // CSS pixels that all controls with the frame's number need in one line
 const TALLER = 1.4;
 
 export class Stage extends Remote {
@@ -218,6 +219,7 @@ export class Stage extends Remote {
     this.timeline.resize(wide, scored ? this.score.gutterWidth : 10, MARGIN, ratio);
     const crowd = picture.clientWidth < PHONE && figures.plan(picture.clientWidth, options.height).rows > 1;
     picture.style.height = `${Math.round(options.height * (crowd ? TALLER : 1))}px`;
+    this.toolbar.element.classList.toggle("is-narrow", picture.clientWidth < ONE_LINE);
     figures.plain = this.pace.plain;
     figures.resize(picture.clientWidth, picture.clientHeight, this.pace.ratio(ratio));
     if (this.data) this.figures.fit();
