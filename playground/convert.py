@@ -8,16 +8,17 @@ of the features are in neither file: the authors read Mean.npy and Std.npy in th
 
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
 
-from playground.checkpoints import Card, load_tokenizer, save_checkpoint
+from playground.checkpoints import TRAINING_ONLY, Card, load_tokenizer, save_checkpoint
 from playground.errors import PlaygroundError
 from playground.generators.released import generator_weights
-from playground.generators.scalewise import build_generator
+from playground.generators.scalewise import GeneratorConfig, build_generator
 from playground.limits import LIMITS
 from playground.motion.arrays import open_arrays
 from playground.motion.features263 import COLUMNS263
@@ -26,7 +27,7 @@ from playground.nn.foreign import ForeignState
 from playground.text.encoders import EncoderId
 from playground.text.pretrained import identify_folder
 from playground.tokenizers.released import tokenizer_weights
-from playground.tokenizers.transformer import build_tokenizer
+from playground.tokenizers.transformer import TokenizerConfig, build_tokenizer
 
 ENTRIES = {"tokenizer": ("vq_model", "net"), "generator": ("t2m_transformer",)}  # where the weights are, by kind
 WANTED = {  # options that the released models share, spelt as in the authors' option files
@@ -42,6 +43,8 @@ WANTED = {  # options that the released models share, spelt as in the authors' o
 }
 DATA = {"t2m": "HumanML3D", "motionx": "Motion-X", "cmp": "CMP"}  # dataset_name -> the name on the card
 STATISTICS = ("Mean.npy", "Std.npy")
+ROOM = 2  # times the published sizes that a release may have
+Config = TypeVar("Config", TokenizerConfig, GeneratorConfig)
 
 
 @dataclass(frozen=True)
@@ -73,8 +76,9 @@ def convert_lgtok(
     state, other = read_state(tokenizer, "tokenizer"), read_state(generator, "generator")
     config, weights = tokenizer_weights(state, settings)
     config_generator, weights_generator = generator_weights(other, config)
-    with torch.device("meta"):  # shapes alone: whatever the files claim, no memory is taken for it
-        model, network = build_tokenizer(config), build_generator(config_generator)
+    _check_size(config, TokenizerConfig(), state)
+    _check_size(config_generator, GeneratorConfig(), other)
+    model, network = build_tokenizer(config), build_generator(config_generator)
     _fill(model, weights, state)
     _fill(network, weights_generator, other)
     encoders = _encoder("llama", llama, config.text_width), _encoder("clip", clip, config_generator.text_width)
@@ -87,10 +91,19 @@ def convert_lgtok(
     return Converted(files, tuple(_notes(normaliser, data)))
 
 
+def _check_size(config: Config, published: Config, state: ForeignState) -> None:
+    """PlaygroundError for a model whose sizes are beyond the published ones, before memory is taken for it."""
+    for size in (field.name for field in fields(published) if type(getattr(published, field.name)) is int):
+        if getattr(config, size) > ROOM * getattr(published, size):
+            raise PlaygroundError(
+                f"{state.path} has {size} {getattr(config, size)}; no LG-Tok of that size was released"
+            )
+
+
 def _fill(model: nn.Module, weights: Mapping[str, Tensor], state: ForeignState) -> None:
     state.check_shapes(model.state_dict(), weights)
-    model.load_state_dict(dict(weights), strict=False, assign=True)
-    if lacking := [name for name, value in model.named_parameters() if value.is_meta]:
+    missing = model.load_state_dict(dict(weights), strict=False).missing_keys
+    if lacking := [name for name in missing if name.rsplit(".", 1)[-1] not in TRAINING_ONLY]:
         raise PlaygroundError(f"{state.path} gives no values for {lacking[0]}, so it is not of the released kind")
 
 

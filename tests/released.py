@@ -3,6 +3,7 @@
 Written from the recorded names, not from playground's own mapping, so that the two can be held against each other.
 """
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -43,9 +44,9 @@ def layer(out: dict[str, Tensor], name: str, weights: Mapping[str, Tensor], ours
         out[f"{name}.{kind}"] = weights[f"{ours}.{kind}"].clone()
 
 
-def rotary(length: int, width: int, base: float, like: Tensor) -> tuple[Tensor, Tensor]:
+def rotary(length: int, width: int, base: float) -> tuple[Tensor, Tensor]:
     """Cosines and sines [1, 1, length, width] of interleaved pairs."""
-    angles = torch.zeros(length, width, device=like.device)
+    angles = torch.zeros(length, width)
     for pair in range(width // 2):
         angles[:, 2 * pair] = angles[:, 2 * pair + 1] = torch.arange(length) * base ** (-2 * pair / width)
     return angles.cos()[None, None], angles.sin()[None, None]
@@ -64,7 +65,7 @@ def block(out: dict[str, Tensor], name: str, w: Mapping[str, Tensor], ours: str,
         out[f"{name}.linear1.{kind}"] = gate_up[hidden:].clone()
     layer(out, f"{name}.self_attn.proj", w, f"{ours}.self_attention.out")
     layer(out, f"{name}.linear2", w, f"{ours}.feed_forward.down")
-    cosines, sines = rotary(length, width // heads, 100.0, w[f"{ours}.norms.0.weight"])
+    cosines, sines = rotary(length, width // heads, 100.0)
     out[f"{name}.self_attn.rotary_embedding.x_cos"] = cosines
     out[f"{name}.self_attn.rotary_embedding.x_sin"] = sines
     crossed = f"{ours}.norms.3.weight" in w
@@ -99,8 +100,8 @@ def official_tokenizer(model: LGTok, masked_motion: bool = True) -> dict[str, Te
         book = f"quantizer.layers.{level}"
         out[f"{book}.codebook"] = w[f"quantizer.codebooks.{level}.vectors"].clone()
         out[f"{book}.code_sum"] = torch.zeros_like(out[f"{book}.codebook"])
-        out[f"{book}.code_count"] = torch.ones(size, device=out["mask_token"].device)
-        out[f"{book}.initted"] = torch.ones(1, device=out["mask_token"].device)
+        out[f"{book}.code_count"] = torch.ones(size)
+        out[f"{book}.initted"] = torch.ones(1)
         for place in (0, 1):
             layer(out, f"quantizer.phis.{level}.phi.{place}.0", w, f"quantizer.phis.{level}.convs.{place}")
     half = c.depth // 2
@@ -119,7 +120,6 @@ def official_tokenizer(model: LGTok, masked_motion: bool = True) -> dict[str, Te
 def official_generator(network: ScalewiseTransformer) -> dict[str, Tensor]:
     """Every array that their generator of this size has, without CLIP."""
     w, c = network.state_dict(), network.config
-    device = w["start"].device
     out = {
         "pos_start": w["start"][None].clone(),
         "lvl_embed.weight": w["level"].clone(),
@@ -131,9 +131,9 @@ def official_generator(network: ScalewiseTransformer) -> dict[str, Tensor]:
     places = torch.cat([torch.arange(s) * (2.0 * half / max(s - 1, 1)) for s in c.scales])
     angles = places[:, None] * 100.0 ** (-torch.arange(half) / half)
     levels = torch.cat([torch.full((s,), n) for n, s in enumerate(c.scales)])
-    out["freqs_cis"] = torch.polar(torch.ones_like(angles), angles).to(device)
-    out["lvl_1L"] = levels[None].to(device)
-    out["attn_mask"] = (levels[:, None] >= levels[None]).float()[None, None].to(device)
+    out["freqs_cis"] = torch.polar(torch.ones_like(angles), angles)
+    out["lvl_1L"] = levels[None]
+    out["attn_mask"] = (levels[:, None] >= levels[None]).float()[None, None]
     for level in range(len(c.scales)):
         layer(out, f"heads.{level}", w, f"heads.{level}")
     for number in range(c.depth):
@@ -161,16 +161,16 @@ def official_generator(network: ScalewiseTransformer) -> dict[str, Tensor]:
 def write_release(folder: Path, tokenizer: Mapping[str, Tensor], generator: Mapping[str, Tensor]) -> list[Path]:
     """Tokenizer file, generator file and options, with the training state that their trainers save beside weights."""
     folder.mkdir(parents=True, exist_ok=True)
-    optimiser = torch.optim.AdamW([torch.nn.Parameter(torch.ones(3))], lr=2e-4)
+    optimiser = {"state": {0: {"step": torch.tensor(5.0)}}, "param_groups": [{"lr": 2e-4, "betas": (0.9, 0.99)}]}
     rest = {
-        "scheduler": torch.optim.lr_scheduler.MultiStepLR(optimiser, [180]).state_dict(),
+        "scheduler": {"milestones": Counter([180]), "gamma": 0.1, "last_epoch": 199, "_last_lr": [2e-5]},
         "scaler": {"scale": 65536.0, "growth_factor": 2.0, "_growth_tracker": 3},
         "ep": 199,
         "total_it": 12345,
     }
     paths = [folder / name for name in ("net_best_fid.tar", "generator.tar", "opt.txt")]
-    torch.save({"vq_model": tokenizer, "opt_vq_model": optimiser.state_dict(), **rest}, paths[0])
-    torch.save({"t2m_transformer": generator, "opt_t2m_transformer": optimiser.state_dict(), **rest}, paths[1])
+    torch.save({"vq_model": tokenizer, "opt_vq_model": optimiser, **rest}, paths[0])
+    torch.save({"t2m_transformer": generator, "opt_t2m_transformer": optimiser, **rest}, paths[1])
     paths[2].write_text(options_text())
     return paths
 

@@ -44,6 +44,8 @@ STRANGE = {
     "a generator of other codes": (_swap("heads.1.weight", torch.ones(11, 16), True), "another tokenizer"),
     "a generator with other positions": (_swap("freqs_cis", torch.ones(10, 4, dtype=torch.complex64), True), "rotary"),
     "a generator without a norm": (_swap("blocks.1.ln2.scale", None, True), "ln2"),
+    "a mask vector of another width": (_swap("mask_token", torch.ones(1, 1, 17)), "shape"),
+    "a width beyond all": (_swap("latent_tokens", torch.ones(6, 1_000_000)), "no LG-Tok of that size"),
     "no arrays at all": (lambda tokenizer, generator: tokenizer.clear(), "lacks"),
 }
 
