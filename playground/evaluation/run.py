@@ -160,7 +160,9 @@ def set_up(system: str, library: Library, split: str, order: Order, engine: Engi
         "sampling": asdict(sampling),
         "evaluators": {name: one.hash[:12] for name, one in evaluators.items()},
     }
-    local = replace(runtime.to(spread.device), encoder=CachedEncoder(runtime.encoder, capacity=TEXTS_KEPT))
+    captions, prompts = CachedEncoder(runtime.encoder, capacity=TEXTS_KEPT), runtime.prompt_encoder
+    prompts = None if prompts is None else CachedEncoder(prompts, capacity=TEXTS_KEPT)
+    local = replace(runtime.to(spread.device), encoder=captions, prompt_encoder=prompts)
     drawing = asdict(sampling)
     guidance = drawing.pop("guidance")
     return Campaign(Passes(local, library, evaluators, guidance, drawing, spread), clips, settings)
