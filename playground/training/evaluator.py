@@ -54,6 +54,14 @@ def shared(loss: Tensor) -> Tensor:
     return world * loss - (world - 1) * loss.detach()
 
 
+def common(value: Tensor | float) -> Tensor | float:
+    """A number that every process uses whole: after `shared` its gradient is that of one process."""
+    if not isinstance(value, Tensor) or not distributed.is_initialized():
+        return value
+    world = distributed.get_world_size()
+    return value / world + value.detach() * (1 - 1 / world)
+
+
 class EvaluatorInputs:
     """One training batch on the device. Not a dataclass: Fabric would round its numbers to half precision."""
 
@@ -90,7 +98,7 @@ class EvaluatorStep(nn.Module):
         with torch.autocast(motions.device.type, enabled=False):
             pooled = F.normalize(gathered(batch.text.pooled.float()), dim=-1)
             alike = pooled @ pooled.T >= self.config.alike
-            loss, right = contrast(gathered(motions.float()), gathered(texts.float()), scale, alike)
+            loss, right = contrast(gathered(motions.float()), gathered(texts.float()), common(scale), alike)
             return shared(loss), right
 
     def _variational(self, network: TMRNetwork, batch: EvaluatorInputs) -> tuple[Tensor, Tensor, Tensor]:

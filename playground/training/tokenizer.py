@@ -123,6 +123,8 @@ class TokenizerTask:
 
     def validate(self) -> dict[str, float]:
         """MPJPE in mm on the validation split, over clips and as a mean over sources, true captions, g = 0."""
+        if not self.validation:
+            return {}
         return reconstruction_errors(self.tokenizer, self.validation, self.texts, self.batches.normaliser, self.device)
 
     def export(self, path: Path, facts: dict[str, Any]) -> None:
