@@ -130,24 +130,20 @@ def edited_tokens(
 
     As published, latents are taken as equal shares of the time, and the mask is resized to every scale (A10). With
     `measured`, a token counts by the frames it governs: more than half of them must be edited. In-betweening redraws
-    every token that reaches into the span at all, so that nothing of the old frames is left.
+    every token that reaches into the span at all, so that nothing of the old frames is left; so does a span that is
+    too short for any latent.
     """
     from playground.probes import resized_masks
 
     sizes = [level.size for level in source.levels]
-    any_share = request.kind == "inbetween"
     if request.measured:
         spans = [governed(runtime, source, scale, 0.0, check) for scale in range(1, len(sizes) + 1)]
-        return [np.array([_counts(edited[a:b], any_share) for a, b in level]) for level in spans]
-    if any_share:
-        return [_share_of(edited, size) > 0 for size in sizes]
-    latents = _share_of(edited, sizes[-1])
-    chosen = latents > 0.5
-    return resized_masks(chosen if chosen.any() else latents > 0, sizes)
-
-
-def _counts(edited: Bools, any_share: bool) -> bool:
-    return bool(edited.any() if any_share else edited.mean() > 0.5) if len(edited) else False
+        shares = [np.array([edited[a:b].mean() if b > a else 0.0 for a, b in level]) for level in spans]
+    else:
+        shares = [_share_of(edited, size) for size in sizes]
+    if request.kind == "inbetween" or not (shares[-1] > 0.5).any():
+        return [share > 0 for share in shares]
+    return [share > 0.5 for share in shares] if request.measured else resized_masks(shares[-1] > 0.5, sizes)
 
 
 def _share_of(edited: Bools, size: int) -> NDArray[np.float64]:

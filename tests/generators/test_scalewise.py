@@ -5,7 +5,7 @@ import torch
 from torch.nn import functional as F
 
 from playground.errors import PlaygroundError
-from playground.generators.scalewise import running_sums
+from playground.generators.scalewise import Edit, redraw_masks, running_sums
 from playground.nn.sampling import Sampling
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
@@ -172,3 +172,25 @@ def test_rows_with_their_own_seeds_do_not_depend_on_the_batch():
         words = TextFeatures(text.tokens[row : row + 1], text.mask[row : row + 1], text.pooled[row : row + 1], [[]])
         alone = generator.generate(words, LENGTHS[row : row + 1], Sampling(seed=seed)).tokens
         assert all(torch.equal(a[row : row + 1], b) for a, b in zip(batch.ids, alone.ids, strict=True))
+
+
+def test_masks_of_an_edit_choose_single_tokens():
+    generator, text = tiny_generator(), text_features((4, 2))
+    source = drawn(generator, 1, text)
+    redraw = (torch.tensor([False]), torch.tensor([False, True, False]), torch.ones(6, dtype=torch.bool))
+    *_, last = generator.steps(text, LENGTHS, Sampling(seed=9, top_k=1.0), Edit(source, redraw))
+    for mine, old, mask in zip(last.tokens.ids, source.ids, redraw, strict=True):
+        assert torch.equal(mine[:, ~mask], old[:, ~mask])
+    assert last.tokens != source
+
+
+@pytest.mark.parametrize("forced", [0, 1, 3])
+def test_masks_are_resized_linearly_to_every_scale(forced):
+    keep = torch.tensor([True, True, False, False, True, True])
+    masks = redraw_masks(keep, (1, 3, 6), forced)
+    for level, (mask, size) in enumerate(zip(masks, (1, 3, 6), strict=True)):
+        for position in range(size):  # the middle of a token, on the axis of the latents
+            at = (position + 0.5) * 6 / size - 0.5
+            low = int(at // 1)
+            share = (1 - at % 1) * float(not keep[low]) + (at % 1) * float(not keep[min(low + 1, 5)])
+            assert bool(mask[position]) == (share > 0.5 and level >= forced)

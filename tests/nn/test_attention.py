@@ -2,7 +2,7 @@ import math
 
 import torch
 
-from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention
+from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention, split_heads
 from playground.nn.rope import rope_angles
 
 
@@ -75,3 +75,20 @@ def test_cache_gives_what_one_pass_gives():
     ]
     full = layer(x, rotation=rotation, mask=pattern)
     torch.testing.assert_close(torch.cat(parts, dim=1), full, atol=1e-6, rtol=1e-5)
+
+
+def test_recorded_weights_are_what_the_values_are_multiplied_with():
+    torch.manual_seed(5)
+    layer = CrossAttention(16, 2).eval()
+    x, states = torch.randn(2, 5, 16), torch.randn(2, 4, 16)
+    mask = torch.tensor([[True] * 4, [True, True, False, False]])
+    record: list[torch.Tensor] = []
+    with torch.no_grad():
+        plain = layer(x, Memory(states, mask))
+        seen = layer(x, Memory(states, mask, record=record))
+        value = split_heads(layer.key_value(states).chunk(2, dim=-1)[1], 2)
+        again = layer.out((record[0] @ value).transpose(1, 2).flatten(-2))
+    assert torch.equal(plain, seen) and record[0].shape == (2, 2, 5, 4)
+    torch.testing.assert_close(again, plain, atol=1e-6, rtol=1e-5)
+    torch.testing.assert_close(record[0].sum(-1), torch.ones(2, 2, 5))
+    assert not record[0][1, :, :, 2:].any()
