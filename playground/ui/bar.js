@@ -57,6 +57,7 @@
 
     more.addEventListener('click', () => more.setAttribute('aria-expanded', String(header.classList.toggle('is-open'))));
     window.mtpHeader(element);
+    window.mtpExport.mount(header, part('export'));
     window.mtpSay = say;
   };
 })();

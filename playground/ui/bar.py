@@ -11,6 +11,7 @@ import gradio as gr
 from playground.errors import PlaygroundError
 from playground.ui.code import python_for
 from playground.ui.complete import complete
+from playground.ui.export import export_channel
 from playground.ui.facts import as_sentence
 from playground.ui.services import Services
 from playground.ui.state import parse
@@ -51,6 +52,7 @@ def bar(services: Services, title: str) -> None:
         _BAR.format(title=title), elem_id="mtp-header", apply_default_css=False, js_on_load=_ON_LOAD,
         server_functions=[script_of],
     )  # fmt: skip
+    export_channel(services)
 
 
 def script(services: Services, query: Any) -> dict[str, str]:

@@ -91,6 +91,7 @@
       layout.height = box.clientHeight || undefined;
       await Plotly.react(box, data, layout, { displayModeBar: false, responsive: true, doubleClick: 'reset' });
       box.dataset.drawn = String(Number(box.dataset.drawn || 0) + 1);
+      box.dispatchEvent(new Event('mtp-drawn', { bubbles: true }));
       if (!box.mtpListening) {
         box.mtpListening = true;
         box.on('plotly_click', (event) => {

@@ -72,6 +72,14 @@ class Services:
         """(tokens, codes) of every scale of a system."""
         return [(int(size), int(codes)) for size, codes in self.engine().scales(system)]
 
+    def checkpoint(self, system: str) -> str:
+        """What a token file says of the tokenizer: 12 digits of its file's sha256, "" where there is no file."""
+        path = checkpoint_path(self.engine().assets, system, "tokenizer")
+        if not path.is_file():
+            return ""
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()[:12]
+
     def opening_path(self, name: str) -> Path:
         """Where the stored first result of a room lies."""
         return self.engine().assets / "opening" / f"{name}.json"

@@ -153,6 +153,7 @@
       room = name;
       write();
       listen(name);
+      document.dispatchEvent(new Event('mtp-room'));
     }
     const link = event.target.closest?.('a[data-state]');
     if (link && !event.ctrlKey && !event.metaKey && !event.shiftKey && event.button === 0) {
