@@ -18,6 +18,7 @@ from playground.data.library import SPLITS
 from playground.errors import PlaygroundError
 
 DEFAULT_SYSTEM = "lgtok-lite"
+SOURCES = "joints-npz, humanml3d, kit-ml, motion-x, snapmogen, cmp, bvh or deepmimic"
 MOTION_FILES = (".npz", ".bvh", ".glb")
 BAD_INPUT, STOPPED = 2, 130
 
@@ -160,7 +161,7 @@ def _for_models(command: Command) -> None:
 def _for_data(command: Command) -> None:
     """prepare, train, evaluate, bench."""
     sub = command("prepare", commands.prepare, "published motion data to a library")
-    sub.add_argument("source", metavar="SOURCE", help="joints-npz, humanml3d, bvh or deepmimic")
+    sub.add_argument("source", metavar="SOURCE", help=SOURCES)
     sub.add_argument("root", metavar="ROOT", nargs="?", type=Path, help="the folder of the data; none for deepmimic")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="the library to write")
 
@@ -179,7 +180,10 @@ def _for_data(command: Command) -> None:
     sub.add_argument("--library", type=Path, required=True, metavar="DIR")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="checkpoints and logs")
     sub.add_argument("--resume", action="store_true", help="go on from the last checkpoint in --out, if there is one")
+    sub.add_argument("--size", choices=("cpu", "gpu"), default="cpu", help="of the LG-Tok family (default cpu)")
     sub.add_argument("--steps", type=int, help="other than the run's own number of steps")
+    sub.add_argument("--minutes", type=_number, help="stop after so many minutes, the state saved; --resume goes on")
+    sub.add_argument("--accelerator", choices=("auto", "cpu", "gpu"), default="auto")
     sub.add_argument(
         "--devices", type=int, help="GPUs or processes to use (default: all GPUs; torchrun decides itself)"
     )

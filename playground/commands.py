@@ -144,17 +144,30 @@ def convert(
 
 
 def train(
-    config: str, library: Path, out: Path, resume: bool, steps: int | None, devices: int | None, precision: str
+    config: str,
+    library: Path,
+    out: Path,
+    resume: bool,
+    size: str,
+    steps: int | None,
+    minutes: float | None,
+    accelerator: str,
+    devices: int | None,
+    precision: str,
 ) -> None:
-    """Train a tokenizer or a generator."""
+    """Train a tokenizer, a generator or an evaluator."""
     if devices is not None and devices < 1:
         raise PlaygroundError(f"--devices is {devices}; at least 1 is needed")
+    if minutes is not None and minutes <= 0:
+        raise PlaygroundError(f"--minutes is {minutes:g}; more than 0 is accepted")
     Library.open(library)
     from playground.training.loop import Launch
     from playground.training.run import train
 
-    launch = Launch(devices=devices or "auto", precision=precision)
-    train(config, library, out, resume=resume, steps=steps, launch=launch)
+    launch = Launch(accelerator, devices or "auto", precision=precision)
+    facts = train(config, library, out, size=size, resume=resume, steps=steps, minutes=minutes, launch=launch)
+    if facts["step"] < facts["steps"]:
+        say(f"stopped at step {facts['step']} of {facts['steps']}; --resume goes on")
 
 
 def evaluate(system: str, library: Path, split: str, to: Path | None, **asked: Any) -> None:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from playground.errors import PlaygroundError
+
 if TYPE_CHECKING:
     from lightning.fabric import Fabric
 
@@ -26,8 +28,9 @@ def launched() -> bool:
 
 
 def launch_fabric(launch: Launch, loggers: Sequence[Any] = ()) -> "Fabric":
-    """A launched Fabric; the package lightning is imported here."""
+    """A launched Fabric; the package lightning is imported here. PlaygroundError if the accelerator is not there."""
     from lightning.fabric import Fabric
+    from lightning.fabric.utilities.exceptions import MisconfigurationException
 
     precision = "bf16-mixed" if launch.precision == "auto" else launch.precision
     devices, nodes = launch.devices, launch.nodes
@@ -36,13 +39,18 @@ def launch_fabric(launch: Launch, loggers: Sequence[Any] = ()) -> "Fabric":
         nodes = int(os.environ["WORLD_SIZE"]) // devices
     elif devices == "auto":
         devices = 1
-    fabric = Fabric(
-        accelerator=launch.accelerator,
-        devices=devices,
-        num_nodes=nodes,
-        strategy=launch.strategy,
-        precision=precision,  # type: ignore[arg-type]
-        loggers=list(loggers),
-    )
+    try:
+        fabric = Fabric(
+            accelerator=launch.accelerator,
+            devices=devices,
+            num_nodes=nodes,
+            strategy=launch.strategy,
+            precision=precision,  # type: ignore[arg-type]
+            loggers=list(loggers),
+        )
+    except (MisconfigurationException, RuntimeError) as error:
+        raise PlaygroundError(
+            f"this machine cannot compute on {devices} of the accelerator {launch.accelerator!r}; auto or cpu will do"
+        ) from error
     fabric.launch()
     return fabric

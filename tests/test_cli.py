@@ -84,6 +84,8 @@ BAD_CALLS = {
     "train without a library": ["train", "lgtok-lite-tokenizer", "--out", "run"],
     "train for no steps": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--steps", "many"],
     "train on no devices": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--devices", "0"],
+    "train for no time": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--minutes", "0"],
+    "train another size": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run", "--size", "huge"],
     "train with odd precision": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--precision", "8"],
     "evaluate an unknown system": ["evaluate", "gpt", "--library", "lib"],
     "evaluate on no library": ["evaluate", "lgtok-lite", "--library", "."],
