@@ -170,6 +170,15 @@ def shipped() -> dict[str, Any]:
         "tokenize and reconstruct": lambda: engine.reconstruct(engine.tokenize(motion, caption, name)),
         "generate": lambda: engine.generate(caption, 9.8, name),
     }
+    tokenized = engine.tokenize(motion, caption, name)
+    calls |= {
+        "scale scrubber": lambda: engine.reconstruct(tokenized, scales=5),
+        "every prefix of scales": lambda: engine.scale_study(tokenized),
+        "swap a token": lambda: engine.swap(tokenized, 5, 3, "opposite"),
+        "governed spans, finest scale": lambda: engine.governed(tokenized, len(tokenized.levels)),
+        "edit": lambda: engine.edit(tokenized, None, caption),
+        "place in the stored map": lambda: engine.place(tokenized),
+    }
     timings: dict[str, Timing] = interleave(calls, turns=9, budget=30.0)
     return {"seconds": {**seconds, **{what: timing.best for what, timing in timings.items()}}, "peak": peak_bytes()}
 

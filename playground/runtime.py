@@ -2,7 +2,7 @@
 
 import copy
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -34,16 +34,6 @@ class QuantizedArrays:
     energy: Floats  # [N + 1]
     embedding: Floats  # [T, D]
     per_level: Floats  # [N, T, D]
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnScale:
-    """One step of a generation."""
-
-    level: int
-    levels: tuple[LevelTokens, ...]
-    entropy: Floats  # [s_level], bits
-    embedding: Tensor  # [1, T, D]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +96,6 @@ class Runtime:
         """Normalised rows [frames, 67] decoded with the caption and with the null text."""
         pair = self.tokenizer.branches(self.embedding(levels), torch.tensor([frames]), self.text(caption))
         return pair[0][0].numpy(), pair[1][0].numpy()
-
-    def generate(self, prompt: str | None, frames: int, sampling: dict[str, Any]) -> Iterator[DrawnScale]:
-        """Draw one motion scale by scale. PlaygroundError if the system has no generator."""
-        if self.generator is None:
-            raise PlaygroundError(f"the system {self.name} has no generator; it can tokenize and decode only")
-        text = None if prompt is None else self.prompt(prompt)
-        for step in self.generator.steps(text, torch.tensor([frames]), Sampling(**sampling)):
-            yield DrawnScale(step.level, level_tokens(step.tokens), step.entropy[0].numpy(), step.embedding)
 
     # ---- many at once, for evaluation -----------------------------------------------------------------------------
 

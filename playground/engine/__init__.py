@@ -11,11 +11,14 @@ torch is imported at the first call that needs a model, so that importing this p
 from playground.engine.base import ASSETS
 from playground.engine.checks import UNIT, check_generation, check_guidance, prepare
 from playground.engine.core import Engine, default_engine
+from playground.engine.editing import KINDS as EDIT_KINDS
+from playground.engine.editing import benchmark_span
 from playground.results import Decoded, Example, Generation, GenerationStep, GuidancePair, Tokenized
 from playground.systems import SystemInfo
 
 __all__ = [
     "ASSETS",
+    "EDIT_KINDS",
     "UNIT",
     "Decoded",
     "Engine",
@@ -25,6 +28,7 @@ __all__ = [
     "GuidancePair",
     "SystemInfo",
     "Tokenized",
+    "benchmark_span",
     "check_generation",
     "check_guidance",
     "default_engine",
