@@ -130,6 +130,13 @@ def sixd_to_matrix(sixd: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
+def rotvec_to_quaternion(rotvec: Array) -> Array:
+    """Axis times angle in radians [..., 3] -> unit quaternions [..., 4]; the zero vector is no rotation."""
+    rotvec = np.asarray(rotvec, np.float64)
+    half = np.linalg.norm(rotvec, axis=-1, keepdims=True) / 2.0
+    return np.concatenate([np.cos(half), rotvec * (np.sinc(half / np.pi) / 2.0)], axis=-1)
+
+
 def euler_to_quaternion(angles: Array, order: str) -> Array:
     """Angles [..., K] in radians about the axes named by `order` ("ZXY": first letter applied last) -> [..., 4]."""
     q = axis_quaternion("XYZ".index(order[0].upper()), angles[..., 0])

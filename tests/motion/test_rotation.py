@@ -138,3 +138,10 @@ def test_a_zero_quaternion_becomes_no_rotation_without_a_warning() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert np.array_equal(r.qnormalise(np.zeros((2, 4))), [[1, 0, 0, 0], [1, 0, 0, 0]])
+
+
+@given(st.tuples(*[st.floats(-7, 7)] * 3))
+def test_axis_times_angle_agrees_with_scipy(rotvec: tuple[float, float, float]) -> None:
+    expected = Rotation.from_rotvec(rotvec).as_matrix()
+    assert np.allclose(r.quaternion_to_matrix(r.rotvec_to_quaternion(np.array(rotvec))), expected, atol=1e-9)
+    assert np.array_equal(r.rotvec_to_quaternion(np.zeros((2, 3))), [[1, 0, 0, 0]] * 2)

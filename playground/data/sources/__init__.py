@@ -9,13 +9,20 @@ from playground.data.library import LibraryClip, write_library
 from playground.data.sources.base import Reading, SourceEntry
 from playground.data.sources.bvh import read_bvh_folder
 from playground.data.sources.deepmimic import read_deepmimic
-from playground.data.sources.humanml3d import read_humanml3d
+from playground.data.sources.humanml3d import read_cmp, read_humanml3d
 from playground.data.sources.joints_npz import read_joints_npz
+from playground.data.sources.kit_ml import read_kit_ml
+from playground.data.sources.motionx import read_motion_x
+from playground.data.sources.snapmogen import read_snapmogen
 from playground.errors import PlaygroundError
 
 SOURCES: dict[str, SourceEntry] = {
     "joints-npz": SourceEntry(read_joints_npz, True, "a folder with motions.npz and clips.jsonl"),
     "humanml3d": SourceEntry(read_humanml3d, True, "HumanML3D as its authors publish it"),
+    "kit-ml": SourceEntry(read_kit_ml, True, "KIT-ML in HumanML3D's folders, 21 joints at 12.5 frames a second"),
+    "motion-x": SourceEntry(read_motion_x, True, "Motion-X as published, body only"),
+    "snapmogen": SourceEntry(read_snapmogen, True, "SnapMoGen as its authors publish it, unpacked"),
+    "cmp": SourceEntry(read_cmp, True, "CMP (Combat Motion Processed) as its authors publish it"),
     "bvh": SourceEntry(read_bvh_folder, True, "a folder of .bvh files, with captions.csv if you have captions"),
     "deepmimic": SourceEntry(read_deepmimic, False, "the motions that an installed pybullet package carries"),
 }

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +14,9 @@ from playground.data.library import LibraryClip
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.representation import canonicalise
+from playground.motion.retarget import retarget
 from playground.motion.skeleton import HUMAN22
+from playground.motion.source import Source
 
 SHORTEST = LIMITS.min_frames + 1  # poses of the shortest clip worth storing
 CANONICAL = 2e-3  # metres by which the first pose may be off before it is moved and turned
@@ -80,10 +82,46 @@ def library_clip(
     return LibraryClip(id, source, split, action_of(label), captions or ("",), canonical)
 
 
+def retargeted(
+    rows: NDArray[np.floating],
+    source_of: Callable[[NDArray[np.floating]], Source],
+    left_out: Counter[str],
+    *,
+    upright: bool,
+) -> NDArray[np.float32] | None:
+    """Rows of a data set as joints [F, 22, 3], metres, 20 fps; None, counted in `left_out`, for no body understood."""
+    if not np.isfinite(rows).all():
+        left_out["clips with values that are not finite numbers"] += 1
+        return None
+    try:
+        return retarget(source_of(rows), upright=upright).joints
+    except PlaygroundError:
+        left_out["clips whose body or path is not understood"] += 1
+        return None
+
+
 def split_of(take: str) -> str:
     """train, val or test for a take that has no split of its own: 80, 5, 15 %, by a hash of its name."""
     share = int.from_bytes(hashlib.sha256(take.encode()).digest()[:4], "big") / 2**32
     return "train" if share < 0.80 else "val" if share < 0.85 else "test"
+
+
+def read_numbers(path: Path) -> NDArray[np.floating]:
+    """The real numbers of one .npy file, mapped, not read. PlaygroundError if it holds anything else, or pickles."""
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise PlaygroundError(f"{path} is not an array file that numpy can read without pickle") from error
+    if not isinstance(array, np.ndarray) or array.dtype.kind != "f" or not array.size:
+        raise PlaygroundError(f"{path} holds no real numbers")
+    return array
+
+
+def check_ids(path: Path, ids: Iterable[str]) -> None:
+    """PlaygroundError where a list of clips names something outside of its folder."""
+    for id in ids:
+        if "\\" in id or id.startswith("/") or ".." in id.split("/"):
+            raise PlaygroundError(f"{path} holds {id!r}; one clip id a line is accepted")
 
 
 def read_text(path: Path) -> str:
