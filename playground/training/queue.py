@@ -4,17 +4,24 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from playground.data.library import Library
 from playground.errors import PlaygroundError
-from playground.launch import Launch
+from playground.launch import Launch, launched
+from playground.training.configs import GeneratorTraining
 from playground.training.family import SIZES
 from playground.training.run import Order, Training, part_of, run_training
 from playground.training.state import read_facts
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # where files cannot be locked, one queue at a time is up to the user
+    fcntl = None  # type: ignore[assignment]
 
 Say = Callable[[str], None]
 
@@ -43,6 +50,12 @@ class Job:
         return read_facts(self.checkpoint.with_name("state.safetensors"))
 
     @property
+    def ready(self) -> bool:
+        """Whether it can be begun: a generator needs its tokenizer."""
+        needed = self.out / "tokenizer" / "checkpoint.safetensors"
+        return not isinstance(self.training, GeneratorTraining) or needed.is_file()
+
+    @property
     def done(self) -> bool:
         """Whether its checkpoint is there and has all the steps."""
         return self.checkpoint.is_file() and self.facts().get("step", 0) >= self.steps
@@ -65,24 +78,54 @@ class Limits:
 def run_queue(jobs: Sequence[Job], limits: Limits, say: Say, after: Callable[[Job], None] | None = None) -> bool:
     """Run every job that is not done, in order; `after` is called for every job, once it is done. True if all are.
 
-    Killed at any point, a second call goes on where the last saved state was. False when the time is up.
+    Killed at any point, a second call goes on where the last saved state was. Two calls at the same time share the
+    work: a job that another process trains is passed over. False when the time is up or others are still at work.
     """
-    for number, job in enumerate(jobs, start=1):
-        if not job.done:
-            if limits.passed:
+    waiting = list(jobs)
+    while waiting:
+        with ExitStack() as held:
+            job = next((job for job in waiting if job.done or (job.ready and held.enter_context(alone(job)))), None)
+            if job is None:
+                say(f"{len(waiting)} of {len(jobs)} are left to other processes; call again when those are through")
                 return False
-            say(f"{number} of {len(jobs)}: {job.name}, {left(jobs)}")
-            launch, deadline = limits.launch, limits.deadline
-            facts = run_training(
-                job.training,
-                Order(limits.library, job.out, resume=True, launch=launch, deadline=deadline, about=job.about),
-            )
-            if facts["step"] < job.steps:
-                say(f"stopped at step {facts['step']} of {job.steps}; call again to go on")
+            if not job.done and not _train(job, jobs, limits, say):
                 return False
+        waiting.remove(job)
         if after is not None:
             after(job)
     return True
+
+
+def _train(job: Job, jobs: Sequence[Job], limits: Limits, say: Say) -> bool:
+    """Train one job to its end; False if the time is up before."""
+    if limits.passed:
+        return False
+    say(f"{jobs.index(job) + 1} of {len(jobs)}: {job.name}, {left(jobs)}")
+    order = Order(limits.library, job.out, True, None, limits.launch, None, limits.deadline, job.about)
+    facts = run_training(job.training, order)
+    if facts["step"] < job.steps:
+        say(f"stopped at step {facts['step']} of {job.steps}; call again to go on")
+        return False
+    return True
+
+
+@contextmanager
+def alone(job: Job) -> Iterator[bool]:
+    """Whether this process may train the job; until the block ends no other process may. The system frees a dead one's.
+
+    Processes of one run (torchrun) work on the same job and do not ask.
+    """
+    if launched() or fcntl is None:
+        yield True
+        return
+    job.checkpoint.parent.mkdir(parents=True, exist_ok=True)
+    with open(job.checkpoint.with_name("lock"), "w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
 
 
 def left(jobs: Sequence[Job]) -> str:

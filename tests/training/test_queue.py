@@ -26,7 +26,7 @@ from playground.tokenizers.transformer import build_tokenizer
 from playground.training import ablations, ship, train_family
 from playground.training.configs import GeneratorTraining, Schedule, TokenizerTraining
 from playground.training.loop import Launch
-from playground.training.queue import Job, Limits, chosen, left, run_queue, status
+from playground.training.queue import Job, Limits, alone, chosen, left, run_queue, status
 from tests.conftest import drifting
 from tests.tiny import TINY, TINY_GENERATOR
 
@@ -98,6 +98,17 @@ def test_a_stopped_run_has_the_weights_of_one_that_never_stopped(library, tmp_pa
     ):
         for name in one.keys():  # noqa: SIM118
             assert (one.get_tensor(name) == other.get_tensor(name)).all(), name
+
+
+def test_two_queues_share_the_work(library, tmp_path):
+    todo, said = jobs(tmp_path / "runs"), []
+    with alone(todo[0]) as mine:
+        assert mine
+        with alone(todo[0]) as again:
+            assert not again
+        assert not run_queue(todo, Limits(library, CPU), said.append)  # y alone: x is taken, its generator must wait
+        assert [job.done for job in todo] == [False, False, True] and "2 of 3 are left" in said[-1]
+    assert run_queue(todo, Limits(library, CPU), said.append)
 
 
 def test_unknown_names_are_refused_and_the_family_is_listed(tmp_path, capsys):
