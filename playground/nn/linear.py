@@ -57,10 +57,17 @@ def linear(x: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
     return _product(x, weight, bias)
 
 
-class Linear(nn.Linear):
-    """`nn.Linear` through `linear`; the same parameters, names and initialisation."""
+class _Packable:
+    """Holds the laid-out weights, which stay behind when the layer is copied: they cannot be, nor moved to a GPU."""
 
     packed: Tensor | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "packed"}
+
+
+class Linear(_Packable, nn.Linear):
+    """`nn.Linear` through `linear`; the same parameters, names and initialisation."""
 
     def forward(self, x: Tensor) -> Tensor:
         """x [..., K] -> [..., N]."""
@@ -69,10 +76,8 @@ class Linear(nn.Linear):
         return linear(x, self.weight, self.bias)
 
 
-class Conv3(nn.Conv1d):
+class Conv3(_Packable, nn.Conv1d):
     """Convolution of kernel 3 and padding 1 along time, on [B, T, K] -> [B, T, N]; the parameters of `nn.Conv1d`."""
-
-    packed: Tensor | None = None
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__(inputs, outputs, 3, padding=1)

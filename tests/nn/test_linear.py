@@ -1,3 +1,5 @@
+import copy
+
 import pytest
 import torch
 
@@ -60,3 +62,17 @@ def test_packed_layers_equal_plain_ones(relu, rows):
 def test_only_a_frozen_model_is_packed():
     with pytest.raises(ValueError, match="frozen"):
         pack(Linear(2, 2))
+
+
+@pytest.mark.parametrize("layer", [Linear(6, 5), Conv3(6, 5)], ids=["linear", "conv"])
+def test_a_packed_layer_can_be_copied(layer):
+    layer = layer.requires_grad_(False)
+    x = torch.randn(2, 7, 6)
+    plain = layer(x)
+    pack(layer)
+    twin = copy.deepcopy(layer)
+    assert twin.packed is None and torch.equal(twin.weight, layer.weight) and twin.weight is not layer.weight
+    torch.testing.assert_close(twin(x), plain, atol=1e-6, rtol=1e-5)
+    torch.testing.assert_close(layer(x), plain, atol=1e-6, rtol=1e-5)
+    pack(twin)
+    torch.testing.assert_close(twin(x), plain, atol=1e-6, rtol=1e-5)
