@@ -209,9 +209,11 @@ def payload(
     strips: Sequence[Json] = (),
     hatch: Sequence[tuple[int, int]] = (),
     hatched: str = "kept as it was",
+    scene: str | None = None,
 ) -> Json:
     """The whole stage, checked. strips: heat maps under the score; hatch: spans (first, last+1 frame) that are hatched
-    on timeline and score, and `hatched` what that means.
+    on timeline and score, and `hatched` what that means; scene: what is shown, in any words: clock and selection go on
+    while it is the same and start anew with another (None: told by the figures).
 
     PlaygroundError if figures are none or too many, ids repeat or point nowhere, spans are not in order.
     """
@@ -251,6 +253,7 @@ def payload(
         "strips": list(strips),
         "hatch": [[int(start), int(stop)] for start, stop in hatch],
         "hatched": hatched,
+        "scene": scene,
     }
 
 

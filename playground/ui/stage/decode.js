@@ -83,5 +83,6 @@ export function decodePayload(payload) {
     strips: (payload.strips || []).map(decodeStrip),
     hatch: payload.hatch || [],
     hatched: payload.hatched || "kept as it was",
+    scene: payload.scene ?? null,
   };
 }

@@ -112,7 +112,7 @@ export class Stage extends Remote {
 
   show(data) {
     const first = !this.scene;
-    const scene = [data.frames, ...data.figures.map((figure) => figure.id)].join();
+    const scene = data.scene ?? [data.frames, ...data.figures.map((figure) => figure.id)].join();
     const patch = { frames: data.frames, fps: data.fps, hover: null, probe: null };
     if (data.features) patch.guidance = data.features.guidance;
     // The same scene told again (a re-decode, one more scale) goes on where it was; another one starts anew.
