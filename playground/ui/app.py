@@ -16,6 +16,7 @@ import gradio as gr
 
 from playground.limits import LIMITS
 from playground.ui.bar import bar
+from playground.ui.cards import tour_json
 from playground.ui.chart import chart_script, plotly_script
 from playground.ui.rooms import ROOMS
 from playground.ui.services import EngineSource, Services
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from playground.engine import Engine
 
 TITLE = "Motion Token Playground"
-SCRIPTS = ("page", "state", "export", "bar")  # the browser half of the page, inline in its head
+SCRIPTS = ("page", "state", "export", "learn", "bar")  # the browser half of the page, inline in its head
 UPLOADS_CHECKED_EVERY = 600  # seconds between looks for old uploaded files
 
 
@@ -82,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _head() -> str:
     """What goes into the page's head: our own style and scripts, inline (`css=` would rewrite our selectors)."""
     here = Path(__file__).parent
-    scripts = [f"window.mtpTable = {table_json()};", chart_script()]
+    scripts = [f"window.mtpTable = {table_json()};", f"window.mtpSteps = {tour_json()};", chart_script()]
     scripts += [(here / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS]
     return f"<style>{style_sheet()}</style>" + "".join(f"<script>{script}</script>" for script in scripts)
 

@@ -4,8 +4,6 @@ import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 
 @dataclass(frozen=True)
@@ -91,11 +89,3 @@ def table(header: list[str], rows: list[list[str]], caption: str) -> str:
         f'<div class="mtp-table-box"><table class="mtp-table"><caption>{html.escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
-
-
-def text_file(name: str, values: dict[str, Any] | None = None) -> str:
-    """The teaching text `texts/<name>.md`, with {placeholders} filled in."""
-    text = (Path(__file__).parent / "texts" / f"{name}.md").read_text(encoding="utf-8")
-    for key, value in (values or {}).items():
-        text = text.replace("{" + key + "}", str(value))
-    return text

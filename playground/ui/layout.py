@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import gradio as gr
 
-from playground.ui.facts import text_file
+from playground.ui.cards import card, card_html
 from playground.ui.stage.component import score_slot, stage_component
 from playground.ui.view import View
 
@@ -41,6 +41,6 @@ def panel(title: str, lead: str) -> Iterator[gr.Column]:
 
 
 def words(name: str) -> None:
-    """The folded explanation of a room, from `texts/<name>.md`."""
+    """The folded explanation of a room: its card of Learn (cards.py)."""
     with gr.Accordion("What am I looking at?", open=False, elem_classes=["mtp-words"]):
-        gr.Markdown(text_file(name))
+        gr.HTML(card_html(card(name), inside=True), apply_default_css=False)

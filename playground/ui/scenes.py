@@ -10,17 +10,13 @@ from playground.figures import stage as scene
 from playground.figures.stage import NOT_FRAMES, ORIGINAL_ID, Json
 from playground.motion.motion import Motion
 from playground.systems import row_of
+from playground.ui.cards import term
 from playground.ui.facts import Fact, bits, bits_text, millimetres
 
 if TYPE_CHECKING:
     from playground.engine import Decoded, GuidancePair, SystemInfo, Tokenized
 
-MPJPE_CARD = (
-    "Mean per-joint position error: how far a joint is from where it was, on average over joints and frames, with the "
-    "pelvis of both figures put on the same spot."
-)
-TOKENS_CARD = "How many codes the motion was written with, over all scales used."
-BITS_CARD = "What it takes to write these tokens down: log2 of the codebook size for each token, added up."
+MPJPE_CARD = term("mpjpe")
 FIXED_GUIDANCE = (0, 1, 2, 3, 4)
 
 
@@ -31,17 +27,22 @@ def score(
     palettes: Sequence[Any] | None = None,
     entropy: Sequence[Any] | None = None,
     sizes: Sequence[tuple[int, int]] = (),
+    spans: Sequence[Any] | None = None,
+    marks: Sequence[Any] | None = None,
+    marked: str = "",
 ) -> Json:
     """The score of one motion: LevelTokens `levels` as rows. The scales of `sizes`, (tokens, codes) each, that have no
-    tokens yet are drawn empty. palettes: colours uint8 [codes, 3] a scale; entropy: bits [s] a scale."""
+    tokens yet are drawn empty. palettes: colours uint8 [codes, 3] a scale; entropy: bits [s] a scale; spans: measured
+    frames [s, 2] a scale, None where it was not measured; marks: bool [s] a scale, and `marked` what they mean."""
     rows = []
     for n, level in enumerate(levels):
         colors = palettes[n] if palettes else None
         nats = np.asarray(entropy[n], np.float64) * math.log(2) if entropy else None  # the engine counts in bits
-        rows.append(scene.level(level.ids, level.codes, colors, nats))
+        span, mark = spans[n] if spans else None, marks[n] if marks else None
+        rows.append(scene.level(level.ids, level.codes, colors, nats, spans=span, marks=mark))
     rows += [scene.level(None, codes, size=size) for size, codes in sizes[len(levels) :]]
     note = "" if row_of(system.name).latents_are_frames else NOT_FRAMES
-    return scene.track(system.name, system.title, frames, rows, note)
+    return scene.track(system.name, system.title, frames, rows, note, marked or "changed")
 
 
 def tokenized_scene(
@@ -93,8 +94,8 @@ def token_facts(levels: Sequence[Any], used: int | None = None) -> tuple[Fact, .
     kept = list(levels)[:used]
     sizes, codes = [int(level.size) for level in kept], [int(level.codes) for level in kept]
     return (
-        Fact(f"{sum(sizes):,}", "tokens", TOKENS_CARD),
-        Fact(bits_text(bits(sizes, codes)), "to store", BITS_CARD),
+        Fact(f"{sum(sizes):,}", "tokens", term("tokens")),
+        Fact(bits_text(bits(sizes, codes)), "to store", term("bits")),
     )
 
 

@@ -69,8 +69,8 @@
   function hide(names) {
     const asked = new Set(names.split(','));
     const elements = table.controls.filter((row) => row.element && asked.has(row.key)).map((row) => `#${row.element}`);
-    const parts = table.parts.filter((part) => asked.has(part)).map((part) => `[data-part="${part}"]`);
-    const known = new Set([...table.controls.filter((row) => row.element).map((row) => row.key), ...table.parts]);
+    const parts = Object.keys(table.parts).filter((part) => asked.has(part)).map((part) => table.parts[part]);
+    const known = new Set([...table.controls.filter((row) => row.element).map((row) => row.key), ...Object.keys(table.parts)]);
     hidden = [...asked].filter((name) => known.has(name)).join(',');
     const sheet = document.getElementById('mtp-hidden') ?? document.head.appendChild(document.createElement('style'));
     sheet.id = 'mtp-hidden';
@@ -165,6 +165,7 @@
 
   window.mtpState = {
     door, keep, settled, open, query,
+    enter: (name) => tabOf(name)?.click(),
     get room() { return room; },
     get panel() { return panelOf(room); },
     stage: () => stageOf(room),

@@ -20,7 +20,9 @@ from playground.limits import LIMITS
 from playground.systems import SYSTEMS
 
 ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "learn")
-PARTS = ("link", "python", "export", "tour", "learn")  # parts of the page, beside controls, that `hide` may name
+PARTS = {name: f'[data-part="{name}"]' for name in ("link", "python", "export", "tour")} | {
+    "learn": "#room-learn-button"
+}  # parts of the page, beside controls, that `hide` may name -> how the page finds them
 UPLOADED = "uploaded"  # what a menu of motions calls the visitor's own file
 OWN_FILE = "file:"  # how the value of `motion` begins that stands for a file of the visitor's own
 Value = Any  # str | float | int | bool | tuple[str, ...] | Scales | Token | Span | None
@@ -111,6 +113,9 @@ CONTROLS: tuple[Control, ...] = (
             element="generate-temperature"),
     Control("topk", "generate", "number", None, "Top-k, share of codes", 0.01, 1, element="generate-topk"),
     Control("topp", "generate", "number", None, "Top-p, share of odds", 0.05, 1, element="generate-topp"),
+    Control("takes", "generate", "whole", 1, "Side by side", 1, LIMITS.max_seeds, element="generate-takes"),
+    Control("take", "generate", "whole", 0, "Tokens of", 0, LIMITS.max_seeds - 1, element="generate-take"),
+    Control("changes", "generate", "name", None, "Changes to the motion"),
     *_of_stage("guidance", "guidance"),
     Control("motion", "guidance", "name", None, "Motion", element="guidance-example"),
     Control("caption", "guidance", "text", None, "Caption", 0, _PROMPT, element="guidance-caption"),

@@ -127,8 +127,9 @@ def token_css() -> str:
 
 
 def style_sheet() -> str:
-    """The whole style sheet of the page: the tokens, then `page.css`."""
-    return token_css() + (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
+    """The whole style sheet of the page: the tokens, then `page.css` and `learn.css`."""
+    sheets = [(Path(__file__).parent / f"{name}.css").read_text(encoding="utf-8") for name in ("page", "learn")]
+    return token_css() + "".join(sheets)
 
 
 def theme() -> gr.themes.Base:

@@ -8,6 +8,7 @@ from playground.analysis.bundle import Bundle
 from playground.errors import PlaygroundError
 from playground.figures.theme import percent, readable
 from playground.figures.usage import usage_panels, usage_summary
+from playground.ui.cards import term
 from playground.ui.chart import chart
 from playground.ui.errors import attach, error_line, message_place
 from playground.ui.facts import Fact, facts_line, table
@@ -23,8 +24,6 @@ LEAD = (
 )
 ORDERS = [("most used first", "sorted"), ("by number", "index")]
 PANELS, SUMMARY = 410, 216
-USED_CARD = "Codes that at least one motion needed, of all codes of all scales."
-PERPLEXITY_CARD = "How many codes are in real use: as many as an evenly used list of that length would have."
 
 
 def panels(bundle: Bundle, title: str, order: str) -> str:
@@ -64,8 +63,8 @@ def opening_view(services: Services) -> View:
     usage = bundle.usage
     dead = sum(len(codes) for codes in usage.dead_)
     facts = (
-        Fact(percent(usage.used_all_), f"of {sum(bundle.codes):,} codes used", USED_CARD),
-        Fact(f"{dead:,}", "dead"),
+        Fact(percent(usage.used_all_), f"of {sum(bundle.codes):,} codes used", term("codes used")),
+        Fact(f"{dead:,}", "dead", term("dead code")),
         Fact(f"{int(usage.totals_.sum()):,}", "tokens counted"),
     )
     return View(

@@ -11,6 +11,7 @@ from playground.analysis.bundle import DECODED_NOTE, Bundle
 from playground.errors import PlaygroundError
 from playground.figures.embedding import embedding_maps
 from playground.figures.theme import percent
+from playground.ui.cards import term
 from playground.ui.chart import chart
 from playground.ui.errors import attach, message_place
 from playground.ui.facts import Fact
@@ -32,7 +33,6 @@ LEAD = (
 HEIGHT = 420
 NEIGHBOURS = 4
 DOING = "Decoding its tokens"
-ERROR_CARD = "Error of this clip when it was tokenized with its own caption; measured when the map was made."
 RING = """(id) => {
   document.dispatchEvent(new CustomEvent('mtp-pick', { detail: { chart: 'embedding-map', id } }));
   return id;
@@ -86,7 +86,7 @@ def show(services: Services, system: "SystemInfo", bundle: Bundle, row: int) -> 
     palettes = services.palettes(system.name)
     return View(
         stage=clip_scene(system, decoded.motion, levels, palettes, label_of(bundle, row), DECODED_NOTE),
-        facts=(Fact(f"{bundle.errors_mm[row]:.0f} mm", "MPJPE", ERROR_CARD), *token_facts(levels)),
+        facts=(Fact(f"{bundle.errors_mm[row]:.0f} mm", "MPJPE", term("clip error")), *token_facts(levels)),
         controls={"id": clip.id, "label": label_of(bundle, row), "near": _near(bundle, row)},
         seconds=time.perf_counter() - began,
     )
