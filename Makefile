@@ -25,7 +25,7 @@ SIZE ?= cpu
 MINUTES ?=
 QUEUE = --library $(LIBRARY) --size $(SIZE) $(if $(MINUTES),--minutes $(MINUTES))
 
-.PHONY: help setup app test notebooks train family ablations bench lint format screenshots clean
+.PHONY: help setup app test notebooks figures train family ablations bench lint format screenshots clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 24
@@ -49,6 +49,9 @@ format: $(DEV) ## let ruff format the code
 
 notebooks: $(DEV) ## execute every notebook in place
 	$(BIN)/jupyter execute --inplace --timeout=1800 notebooks/*.ipynb
+
+figures: $(DEV) $(LIBRARY)/library.json ## make the stored results that are missing or of other checkpoints (hours; stops and goes on at will)
+	$(BIN)/python -m playground.evaluation.published --library $(LIBRARY)
 
 $(LIBRARY)/library.json: | $(DEV)
 	$(BIN)/python -m playground prepare joints-npz $(DATA) --out $(LIBRARY)

@@ -62,7 +62,7 @@ def run(out: Path | None = None) -> None:
     PlaygroundError if a case fails.
     """
     reference = json.loads((ROOT / "benchmarks" / "reference.json").read_text(encoding="utf-8"))
-    machine = _machine()
+    machine = this_machine()
     _say(f"{machine['processor']}, {machine['cores']} cores, load {machine['load']:.1f}, torch {machine['torch']}")
     rows: list[Row] = []
     section = ""
@@ -148,7 +148,7 @@ def page_ready() -> float:
             process.wait(timeout=30)
 
 
-def _machine() -> dict[str, Any]:
+def this_machine() -> dict[str, Any]:
     """What the figures were measured on."""
     from importlib.metadata import version
 

@@ -5,7 +5,7 @@ items, the same on every process (spread.py).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,6 +51,14 @@ class Rebuilt:
     ids: list[NDArray[np.int64]]
     likelihood: list[Floats]
     predictions: list[NDArray[np.int64]]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to decode drawn tokens: with the caption or without any text, and the guidance scale g."""
+
+    text: bool
+    guidance: float = 0.0
 
 
 class Passes:
@@ -115,6 +123,18 @@ class Passes:
             for g, filled in zip(scales, motions, strict=True):
                 rows = self.runtime.normaliser.invert((1 + g) * with_text - g * without)
                 self._fill(filled, part, [one[: item.rows] for one, item in zip(rows, batch, strict=True)])
+            self.tally.add(len(part))
+        return [self._shared(filled) for filled in motions]
+
+    def read(self, items: Sequence[Item], prompted: bool, readings: Sequence[Reading]) -> list[Motions]:
+        """Tokens drawn from the captions, or without any text (free-form), decoded in several ways (Table 8)."""
+        motions = [self._nothing(len(items)) for _ in readings]
+        for part in self._mine(items):
+            batch = [items[place] for place in part]
+            bare = [replace(item, caption="") for item in batch]
+            drawn = self.draw(batch if prompted else bare)
+            for reading, filled in zip(readings, motions, strict=True):
+                self._fill(filled, part, self.decode(batch if reading.text else bare, drawn, reading.guidance))
             self.tally.add(len(part))
         return [self._shared(filled) for filled in motions]
 

@@ -1,7 +1,7 @@
 """One repeat of an evaluation: every metric on recorded, rebuilt and generated motions; the mean of many repeats."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from playground.evaluation import items as draws
 from playground.evaluation import metrics
 from playground.evaluation.items import draw_items, draw_samples, prompt_items, stream
 from playground.evaluation.metrics import SAMPLE_PAIRS, Missing, Value, average
-from playground.evaluation.passes import Motions, Passes, Rebuilt
+from playground.evaluation.passes import Motions, Passes, Reading, Rebuilt
 
 MAIN, CLIP = "tmr", "clip"  # evaluator of all metrics, and that of the CLIP-style score
 SMALL = 512  # motions below which a FID is called a small-sample one (F2)
@@ -79,6 +79,16 @@ class Repeat:
         recorded, real = self._recorded()
         swept = self.passes.swept(self.items, scales)
         return {"real": real} | {name_of(g): self._motions(m, recorded) for g, m in zip(scales, swept, strict=True)}
+
+    def read(self, readings: Mapping[str, Reading]) -> dict[str, Table]:
+        """{"real", and for every way to draw and to read tokens a table named by `drawn_name`} (Table 8)."""
+        recorded, real = self._recorded()
+        tables = {"real": real}
+        for prompted in (False, True):
+            done = self.passes.read(self.items, prompted, list(readings.values()))
+            for name, motions in zip(readings, done, strict=True):
+                tables[drawn_name(prompted, name)] = self._motions(motions, recorded)
+        return tables
 
     # ---- tables ---------------------------------------------------------------------------------------------------
 
@@ -156,6 +166,11 @@ class Repeat:
 
     def _stream(self, what: int) -> np.random.Generator:
         return stream(self.plan.seed, self.number, what)
+
+
+def drawn_name(prompted: bool, reading: str) -> str:
+    """The name of a way to draw and to read tokens in stored tables."""
+    return f"{'prompted' if prompted else 'free'}, {reading}"
 
 
 def name_of(g: float) -> str:

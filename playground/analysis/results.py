@@ -1,0 +1,158 @@
+"""Stored results: what notebooks and rooms show without computing. One reader, one writer, no torch.
+
+`assets/results/<item>-<system>.json`, or `<item>.json` for what belongs to no single system:
+
+    {"item", "made_by": the command line that makes it again, "provenance": {"system", "checkpoint", "data", "split",
+     "n", "seed", ...}, "rows": [{...}, ...], ...}
+
+A measured number in a row is {"mean", "ci95", "n"}, with a null mean and a "why" where it does not exist; any other
+number stands as it is. What further keys there are is told where the item is made. No caption of the data set.
+"""
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from playground.engine import ASSETS
+from playground.errors import PlaygroundError
+
+RESULTS = ASSETS / "results"
+NOT_TRAINED = "not trained yet"
+NOT_MEASURED = "not measured yet"
+_KEYS = ("item", "made_by", "provenance", "rows")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One measured number. mean: None where it does not exist, `why` then says so. ci95: half the 95 % interval."""
+
+    mean: float | None
+    ci95: float | None = None
+    why: str = ""
+
+    @classmethod
+    def of(cls, entry: object) -> "Estimate":
+        """From an entry of a row: {"mean", "ci95"}, a plain number, or None for nothing."""
+        if isinstance(entry, Mapping):
+            mean, ci95 = entry.get("mean"), entry.get("ci95")
+            return cls(mean, ci95 if mean is not None else None, str(entry.get("why", "")))
+        if isinstance(entry, int | float) and not isinstance(entry, bool) and math.isfinite(entry):
+            return cls(float(entry))
+        return cls(None, why="" if entry is None else "not a number")
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval; the mean itself where there is none, nan without a mean."""
+        return math.nan if self.mean is None else self.mean - (self.ci95 or 0.0)
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval; the mean itself where there is none, nan without a mean."""
+        return math.nan if self.mean is None else self.mean + (self.ci95 or 0.0)
+
+
+@dataclass(frozen=True)
+class Result:
+    """One stored result. more: keys of the file beyond the four that every one has."""
+
+    item: str
+    made_by: str
+    provenance: dict[str, Any]
+    rows: list[dict[str, Any]]
+    more: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def system(self) -> str:
+        """The system measured, "" for what belongs to none."""
+        return str(self.provenance.get("system", ""))
+
+    def row(self, **facts: Any) -> dict[str, Any]:
+        """The first row with these values; {} where there is none."""
+        return next((row for row in self.rows if all(row.get(key) == value for key, value in facts.items())), {})
+
+    def estimate(self, key: str, **facts: Any) -> Estimate:
+        """A number of the first row with these values."""
+        return Estimate.of(self.row(**facts).get(key))
+
+    @property
+    def line(self) -> str:
+        """One line for a caption: what it was measured on."""
+        facts = self.provenance
+        parts = [str(facts.get("system", self.item))]
+        parts += [f"checkpoint {facts['checkpoint'][:8]}"] if facts.get("checkpoint") else []
+        if facts.get("data"):
+            clips = f"{facts['n']} " if "n" in facts else ""
+            parts.append(f"{clips}{facts.get('split', '')} clips of {facts['data']}")
+        repeats = facts.get("repeats")
+        parts += [f"{repeats} repeat{'s' if repeats != 1 else ''}"] if repeats else []
+        if facts.get("mm_samples"):
+            parts.append(f"MultiModality of {facts['mm_texts']} texts by {facts['mm_samples']} motions")
+        parts += [f"seed {facts['seed']}"] if "seed" in facts else []
+        return ", ".join(parts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What the file holds."""
+        head = {"item": self.item, "made_by": self.made_by, "provenance": self.provenance}
+        return head | self.more | {"rows": self.rows}
+
+
+def result_path(item: str, system: str = "", folder: Path = RESULTS) -> Path:
+    """The file of a result."""
+    return folder / (f"{item}-{system}.json" if system else f"{item}.json")
+
+
+def read_result(item: str, system: str = "", folder: Path = RESULTS) -> Result | None:
+    """A stored result, None where there is none. PlaygroundError if the file is broken or another item's."""
+    path = result_path(item, system, folder)
+    if not path.is_file():
+        return None
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"))
+        head = {key: held.pop(key) for key in _KEYS}
+        result = Result(**head, more=held)
+        shaped = isinstance(result.rows, list) and all(isinstance(row, dict) for row in result.rows)
+        if not shaped or not isinstance(result.provenance, dict) or (result.item, result.system) != (item, system):
+            raise ValueError("shape")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise PlaygroundError(f"{path} is no stored result of {item}; `make figures` makes it again") from error
+    return result
+
+
+def write_result(result: Result, folder: Path = RESULTS) -> Path:
+    """Write a result, whole or not at all; returns its file. PlaygroundError for numbers that JSON does not know."""
+    path = result_path(result.item, result.system, folder)
+    try:
+        text = json.dumps(result.as_dict(), indent=1, ensure_ascii=False, allow_nan=False)
+    except ValueError as error:
+        raise PlaygroundError(f"the result {result.item} holds a number that is not finite") from error
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    partial.write_text(text + "\n", encoding="utf-8")
+    os.replace(partial, path)
+    return path
+
+
+# ---- a claim of a paper against our numbers --------------------------------------------------------------------------
+
+
+def verdict(better: Estimate, worse: Estimate, *, lower: bool = True) -> str:
+    """Whether `better` is the better one of two numbers, in a sentence that says how sure that is.
+
+    lower: is a lower number better? The intervals cover what repeats of the measurement change, not another training.
+    """
+    if better.mean is None or worse.mean is None:
+        return "cannot be said: " + (better.why or worse.why or "a number is missing")
+    first, second = (better, worse) if lower else (worse, better)  # first should be the lower one
+    apart = "the intervals are apart" if better.ci95 is not None and worse.ci95 is not None else "no intervals"
+    if better.mean == worse.mean:
+        return "not seen: both are equal"
+    if first.high < second.low:
+        return f"seen, {apart}"
+    if second.high < first.low:
+        return f"not seen: it is the other way round, {apart}"
+    leaning = "as the paper has it" if (first.mean or 0.0) < (second.mean or 0.0) else "the other way round"
+    return f"undecided: the intervals overlap; the means stand {leaning}"

@@ -1,0 +1,116 @@
+"""The table of stored results: what each item is and how it is computed; results read, or computed now."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from playground.analysis.results import RESULTS, Result, read_result
+from playground.engine import Engine, default_engine
+from playground.errors import PlaygroundError
+from playground.evaluation.published import measures, motions, timing
+from playground.evaluation.published.base import Progress, Settings, files_of
+from playground.systems import SYSTEMS, checkpoint_path, row_of
+
+Compute = Callable[[str, Settings, Engine, Progress | None], Result]
+FLAGSHIP = "lgtok"
+_ASKED = ("split", "seed", "repeats", "mm_texts", "mm_samples", "motions")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One kind of stored result."""
+
+    name: str
+    what: str
+    compute: Compute
+    draws: bool = True  # is there nothing to measure without a generator?
+
+
+ITEMS: dict[str, Item] = {
+    item.name: item
+    for item in (
+        Item("evaluation", "every metric (Tables 1, 2, 3, Fig 2, perplexity)", measures.evaluation, draws=False),
+        Item("guidance_sweep", "quality against g (Fig 5, Table 5)", measures.sweep),
+        Item("free_form", "tokens with and without text, read with and without it (Table 8)", measures.free_form),
+        Item("edits", "the benchmark masks (Fig 11)", motions.edits),
+        Item("strips", "motions of prompts (Figs 4, 9, 10)", motions.strips),
+        Item("inference_time", "seconds a motion (Table 9)", timing.inference_time),
+    )
+}
+OURS = tuple(name for name, row in SYSTEMS.items() if row.command == "train")
+
+
+def settings_of(system: str, library: Path) -> Settings:
+    """How a system is measured by default: 20 repeats and the full MultiModality for the flagship, less for others."""
+    if system == FLAGSHIP:
+        return Settings(library, repeats=20, mm_texts=96, mm_samples=30, motions=100)
+    return Settings(library)
+
+
+def item_of(name: str) -> Item:
+    """A row of the table. PlaygroundError for an unknown name."""
+    if name not in ITEMS:
+        raise PlaygroundError(f"unknown item {str(name)[:80]!r}; one of {', '.join(ITEMS)} is accepted")
+    return ITEMS[name]
+
+
+def can_measure(item: Item, system: str, engine: Engine) -> bool:
+    """Whether the files that an item needs are there."""
+    parts = ("tokenizer", "generator") if item.draws else ("tokenizer",)
+    return all(checkpoint_path(engine.assets, system, part).is_file() for part in parts)
+
+
+def compute(
+    name: str, system: str, settings: Settings, engine: Engine | None = None, progress: Progress | None = None
+) -> Result:
+    """Compute one result now, with the command line that does the same. PlaygroundError as its item says."""
+    item, engine = item_of(name), engine or default_engine()
+    row_of(system)
+    found = item.compute(system, settings, engine, progress)
+    return replace(found, made_by=command_line(name, system, settings, found.provenance))
+
+
+def command_line(name: str, system: str, settings: Settings, provenance: dict[str, Any]) -> str:
+    """The call that makes a result; it names what the result depends on."""
+    words = ["python -m playground.evaluation.published", name, "--system", system]
+    if "data" in provenance:
+        words += ["--library", Path(settings.library).name]
+    words += [f"--{key.replace('_', '-')} {provenance[key]}" for key in _ASKED if key in provenance]
+    return " ".join(words)
+
+
+def up_to_date(found: Result | None, engine: Engine, settings: Settings) -> bool:
+    """Whether a stored result is of the files that are there now, and of these settings."""
+    if found is None:
+        return False
+    wanted = files_of(engine, found.system) | {key: getattr(settings, key) for key in _ASKED}
+    return all(found.provenance[key] == value for key, value in wanted.items() if key in found.provenance)
+
+
+def results_of(
+    name: str,
+    systems: Iterable[str] | None = None,
+    *,
+    recompute: bool = False,
+    library: str | Path = "library",
+    folder: Path = RESULTS,
+    engine: Engine | None = None,
+    **changes: Any,
+) -> dict[str, Result | None]:
+    """Results of an item by system, None where there is none: what the notebooks call.
+
+    recompute: compute now, for every system whose files are there, and keep nothing. systems: all of ours by default.
+    changes: fields of Settings that are to be other than the default ones; None leaves the default.
+    """
+    item = item_of(name)
+    names = [row_of(system).name for system in (OURS if systems is None else systems)]
+    if not recompute:
+        return {system: read_result(name, system, folder) for system in names}
+    engine = engine or default_engine()
+    asked = {key: value for key, value in changes.items() if value is not None}
+    found: dict[str, Result | None] = {}
+    for system in names:
+        settings = replace(settings_of(system, Path(library)), **asked)
+        found[system] = compute(name, system, settings, engine) if can_measure(item, system, engine) else None
+    return found

@@ -1,0 +1,54 @@
+"""The item inference_time (Table 9): seconds from a sentence to a motion, one motion at a time.
+
+inference_time  rows {"what": one of PARTS, "seconds": {"mean", "ci95", "n"}, "median", "best"}; the provenance names
+                the machine and how busy it was
+"""
+
+import time
+
+import numpy as np
+
+from playground.analysis.passes import first_caption
+from playground.analysis.results import Result
+from playground.bench import this_machine
+from playground.engine import Engine
+from playground.errors import PlaygroundError
+from playground.evaluation.published.base import Progress, Settings, about, measured
+from playground.limits import LIMITS
+
+PARTS = ("text to motion", "text to tokens", "tokens to motion")
+
+
+def inference_time(system: str, settings: Settings, engine: Engine, progress: Progress | None) -> Result:
+    """Generations of the longest motion from captions of the split, after one that is not counted.
+
+    Text encoding is part of it; every caption is new to the encoder. PlaygroundError if the system cannot generate or
+    the split has no caption.
+    """
+    import torch
+
+    library = settings.opened()
+    captions = sorted({first_caption(library.clips[index].captions) for index in library.split(settings.split)} - {""})
+    if not captions or settings.motions < 1:
+        raise PlaygroundError(f"the split {settings.split} of {settings.library} holds no caption to generate from")
+    count = min(settings.motions, len(captions))
+    chosen = [captions[int(place)] for place in np.linspace(0, len(captions) - 1, count)]
+    engine.generate("a person warms up", LIMITS.max_seconds, system, deadline=None)
+    rows: dict[str, list[float]] = {part: [] for part in PARTS}
+    for number, caption in enumerate(chosen, 1):
+        begun = time.perf_counter()
+        made = engine.generate(caption, LIMITS.max_seconds, system, seed=settings.seed + number, deadline=None)
+        whole = time.perf_counter() - begun
+        decoded = engine.decode(made.token_file(), guidance=made.sampling.guidance)
+        for part, seconds in zip(PARTS, (whole, max(whole - decoded.seconds, 0.0), decoded.seconds), strict=True):
+            rows[part].append(seconds)
+        if progress:
+            progress(number, count)
+    computer = this_machine() | {"threads": torch.get_num_threads(), "device": str(engine.runtime(system).device)}
+    facts = {"data": library.name, "split": settings.split, "n": count, "motions": settings.motions,
+             "seed": settings.seed, "frames": made.motion.frames, "machine": computer}  # fmt: skip
+    listed = [
+        {"what": part, "seconds": measured(found), "median": float(np.median(found)), "best": min(found)}
+        for part, found in rows.items()
+    ]
+    return Result("inference_time", "", about(engine, system) | facts, listed)
