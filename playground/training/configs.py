@@ -76,8 +76,9 @@ GENERATORS: dict[str, GeneratorTraining] = {
         model=GENERATOR_PRESETS["lite"],
         tokenizer="lgtok-lite-tokenizer",
         batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-        schedule=Schedule(steps=4_400, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
-        keep=0.8,  # the first 1,500 steps of the shipped one had 0.5
+        schedule=Schedule(steps=5_400, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+        synthetic=0.4,  # 0.1 in the first 4,400 steps of the shipped one
+        keep=0.8,  # 0.5 in its first 1,500 steps
     ),
 }
 
@@ -93,7 +94,7 @@ class RefitTraining:
     text: str = "minilm"
     synthetic: float = 0.1
     language_drop: float = 0.1
-    velocity: float = 1.0  # weight of smoothL1 on differences of successive rows
+    velocity: float = 2.0  # weight of smoothL1 on differences of successive rows
     redrawn: float = 0.45  # share of motions whose fine scales the generator drew anew
     coarse: float = 0.2  # share of motions of which the coarse scales alone are given
     true_scales: int = 3  # at least so many scales are true
@@ -105,7 +106,7 @@ REFITS: dict[str, RefitTraining] = {
     "lgtok-lite-refit": RefitTraining(
         tokenizer_training=TOKENIZERS["lgtok-lite-tokenizer"],
         batch=BatchConfig(size=32, whole=0.8, source_balance=0.5, action_balance=0.3),
-        schedule=Schedule(steps=1_500, rate=5e-4, warmup=100, fall=0.5),
+        schedule=Schedule(steps=2_700, rate=5e-4, warmup=100, fall=0.5),
     ),
 }
 
