@@ -175,11 +175,11 @@ class RefitTask:
         return reconstruction_errors(self.tokenizer, self.validation, self.texts, self.batches.normaliser, self.device)
 
     def export(self, path: Path, facts: dict[str, Any]) -> None:
-        """Write the whole tokenizer, what it was with the refitted detokenizer, and beside it as generator.safetensors
-        the generator, which names the new tokenizer as its own: the tokens are the same."""
+        """Write the whole tokenizer, what it was with the refitted detokenizer, and in the folder `generator` beside
+        its own the generator, which names the new tokenizer: the tokens are the same."""
         refit = {key: facts[key] for key in ("step", "seconds")} | {"from": self.card.hash[:12]}
         merged = self.card.facts | {"refit": refit, "validation": facts["validation"]}
         save_checkpoint(path, self.tokenizer, replace(self.card, facts=merged))
         network, card = self.generator
         named = card.facts | {"tokenizer": read_card(path).hash[:12]}
-        save_checkpoint(path.with_name("generator.safetensors"), network, replace(card, facts=named))
+        save_checkpoint(path.parents[1] / "generator" / path.name, network, replace(card, facts=named))

@@ -179,7 +179,7 @@ def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
         raise PlaygroundError(f"{order.out} holds no trained tokenizer and generator; train both there first")
     frozen, card = load_tokenizer(paths[0])
     network, generator_card = load_generator(paths[1])
-    library, out = Library.open(order.library), order.out / "refit"
+    library, out = Library.open(order.library), order.out / "refit" / "tokenizer"
     normaliser = card.normaliser or library.normaliser
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)

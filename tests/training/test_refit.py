@@ -52,18 +52,18 @@ def trained(tmp_path, monkeypatch) -> tuple[Path, Path]:
 
 def test_only_the_detokenizer_moves_and_the_pair_belongs_together(trained):
     _, out = trained
-    before, after = (load_file(out / part / "checkpoint.safetensors") for part in ("tokenizer", "refit"))
+    before, after = (load_file(out / part / "checkpoint.safetensors") for part in ("tokenizer", "refit/tokenizer"))
     assert before.keys() == after.keys()
     moved = {name for name in before if not torch.equal(before[name], after[name])}
     assert moved and all(name.removeprefix("model.").split(".")[0] in REFIT for name in moved)
     _, old = load_tokenizer(out / "tokenizer" / "checkpoint.safetensors")
-    _, card = load_tokenizer(out / "refit" / "checkpoint.safetensors")
+    _, card = load_tokenizer(out / "refit" / "tokenizer" / "checkpoint.safetensors")
     assert card.facts["refit"]["from"] == old.hash[:12] and card.facts["refit"]["step"] == 3
     assert card.facts["step"] == old.facts["step"] and card.facts["validation"] != old.facts["validation"]
-    _, generator = load_generator(out / "refit" / "generator.safetensors")
+    _, generator = load_generator(out / "refit" / "generator" / "checkpoint.safetensors")
     assert generator.facts["tokenizer"] == card.hash[:12]
     same = load_file(out / "generator" / "checkpoint.safetensors")
-    copied = load_file(out / "refit" / "generator.safetensors")
+    copied = load_file(out / "refit" / "generator" / "checkpoint.safetensors")
     assert all(torch.equal(same[name], copied[name]) for name in same)
 
 
