@@ -188,6 +188,9 @@ def evaluate(system: str, library: Path, split: str, to: Path | None, **asked: A
     _write_text(_json(result) + "\n", to)
     if to:
         say(f"{to}: " + ", ".join(f"{key} {value:.1f}" for key, value in result.items() if isinstance(value, float)))
+        rows = {key: row for key, row in result.get("metrics", {}).items() if row["mean"] is not None}
+        for key, row in rows.items():
+            say(f"  {key} {row['mean']:.3f} ± {row['ci95']:.3f}")
 
 
 def bench(to: Path | None) -> None:
