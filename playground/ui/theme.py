@@ -127,8 +127,10 @@ def token_css() -> str:
 
 
 def style_sheet() -> str:
-    """The whole style sheet of the page: the tokens, then `page.css` and `learn.css`."""
-    sheets = [(Path(__file__).parent / f"{name}.css").read_text(encoding="utf-8") for name in ("page", "learn")]
+    """The whole style sheet of the page: the tokens, then `page.css`, then the other sheets beside it by name."""
+    here = Path(__file__).parent
+    names = ["page", *sorted(path.stem for path in here.glob("*.css") if path.stem != "page")]
+    sheets = [(here / f"{name}.css").read_text(encoding="utf-8") for name in names]
     return token_css() + "".join(sheets)
 
 
