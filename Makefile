@@ -56,9 +56,10 @@ figures: $(DEV) $(LIBRARY)/library.json ## make the stored results that are miss
 $(LIBRARY)/library.json: | $(DEV)
 	$(BIN)/python -m playground prepare joints-npz $(DATA) --out $(LIBRARY)
 
-train: $(DEV) $(LIBRARY)/library.json ## train SYSTEM_NAME: its tokenizer, then its generator; goes on where it stopped (DATA=folder makes LIBRARY)
+train: $(DEV) $(LIBRARY)/library.json ## train SYSTEM_NAME: its tokenizer, its generator, then a refit of the detokenizer; goes on where it stopped (DATA=folder makes LIBRARY)
 	$(BIN)/python -m playground train $(SYSTEM_NAME)-tokenizer --library $(LIBRARY) --out $(RUNS)/$(SYSTEM_NAME) --resume
 	$(BIN)/python -m playground train $(SYSTEM_NAME)-generator --library $(LIBRARY) --out $(RUNS)/$(SYSTEM_NAME) --resume
+	$(BIN)/python -m playground train $(SYSTEM_NAME)-refit --library $(LIBRARY) --out $(RUNS)/$(SYSTEM_NAME) --resume
 
 family: $(DEV) $(LIBRARY)/library.json ## train the LG-Tok family, what is missing of it (SIZE=cpu or gpu, MINUTES=n); stops and goes on at will
 	$(BIN)/python -m playground.training.train_family $(QUEUE)

@@ -22,7 +22,8 @@ def test_every_row_of_the_family_can_be_trained_and_every_training_has_a_row():
     for rows in FAMILY.values():
         for name in FAMILY_NAMES:
             assert f"{name}-tokenizer" in rows
-            assert (f"{name}-generator" in rows) == (SYSTEMS[name].generator is not None)
+            for part in ("generator", "refit"):
+                assert (f"{name}-{part}" in rows) == (SYSTEMS[name].generator is not None)
         assert {name.rsplit("-", 1)[0] for name in rows} == set(FAMILY_NAMES)
 
 

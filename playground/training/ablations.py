@@ -1,9 +1,12 @@
 """The ablations of LG-Tok's Tables 4, 6 and 7: a table, and its queue, `python -m playground.training.ablations`.
 
 Every row is one training with the same seed, steps, batches and clips; what differs is what its name says. The base is
-the paper's tiny model made smaller still (systems.md A7): one block before, in and after the middle, RMSNorm, SwiGLU,
-U-shaped skips, RoPE of base 100, MiniLM token states on both sides, in-context in the tokenizer and by cross-attention
-in the detokenizer.
+the paper's tiny model (systems.md A7) with MiniLM's token states: three blocks a side, post-norm, RMSNorm, SwiGLU,
+U-shaped skips, RoPE of base 100, text on both sides, in-context in the tokenizer and by cross-attention in the
+detokenizer. Ours alone, so that 3,000 steps say something: phi as half the input plus half a convolution, torch's own
+first weights, the loss as a mean over real frames; on a CPU also smaller widths and 4 frames a motion token. Table 4g
+switches motion (or latents) and text of a side together. No clip here is longer than a window, so Table 7 compares
+short clips alone with all of them.
 
 The queue can be killed at any point. After every run it is measured, and the results are written whole; rows that are
 not trained say so.

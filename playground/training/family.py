@@ -17,7 +17,7 @@ from playground.tokenizers.transformer import (
     PRESETS,
     residual_levels,
 )
-from playground.training.configs import GeneratorTraining, Schedule, TokenizerTraining
+from playground.training.configs import GeneratorTraining, RefitTraining, Schedule, TokenizerTraining
 
 SIZES = ("cpu", "gpu")
 
@@ -53,10 +53,12 @@ _GPU_GENERATOR = replace(
     variants=10,
 )
 
-Rows = dict[str, TokenizerTraining | GeneratorTraining]
+_REFIT = Schedule(steps=2_000, rate=5e-4, warmup=100, fall=0.5)
+
+Rows = dict[str, TokenizerTraining | GeneratorTraining | RefitTraining]
 
 
-def family(tokenizer: TokenizerTraining, generator: GeneratorTraining) -> Rows:
+def family(tokenizer: TokenizerTraining, generator: GeneratorTraining, refit: Schedule) -> Rows:
     """Every training of one size, in the order in which they are run: the flagship first, then the comparisons."""
     model = tokenizer.model
     tokenizers = {
@@ -71,11 +73,17 @@ def family(tokenizer: TokenizerTraining, generator: GeneratorTraining) -> Rows:
         name: replace(generator, tokenizer=f"{name}-tokenizer") for name in tokenizers if name != "lgtok-rvq"
     }  # the plain residual tokenizer has no scales to draw one after the other
     rows: Rows = {"lgtok-tokenizer": tokenizers["lgtok"], "lgtok-generator": generators["lgtok"]}
+    refits = {
+        name: RefitTraining(tokenizers[name], replace(tokenizer.batch, whole=0.8, speed=0.0), refit)
+        for name in generators
+    }
+    rows["lgtok-refit"] = refits["lgtok"]
     rows |= {f"{name}-tokenizer": row for name, row in tokenizers.items()}
-    return rows | {f"{name}-generator": row for name, row in generators.items()}
+    rows |= {f"{name}-generator": row for name, row in generators.items()}
+    return rows | {f"{name}-refit": row for name, row in refits.items()}
 
 
 FAMILY: dict[str, Rows] = {
-    "cpu": family(_CPU_TOKENIZER, _CPU_GENERATOR),
-    "gpu": family(_GPU_TOKENIZER, _GPU_GENERATOR),
+    "cpu": family(_CPU_TOKENIZER, _CPU_GENERATOR, _REFIT),
+    "gpu": family(_GPU_TOKENIZER, _GPU_GENERATOR, _REFIT),
 }

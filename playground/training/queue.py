@@ -13,7 +13,7 @@ from typing import Any
 from playground.data.library import Library
 from playground.errors import PlaygroundError
 from playground.launch import Launch, launched
-from playground.training.configs import GeneratorTraining
+from playground.training.configs import GeneratorTraining, RefitTraining
 from playground.training.family import SIZES
 from playground.training.run import Order, Training, part_of, run_training
 from playground.training.state import read_facts
@@ -51,9 +51,10 @@ class Job:
 
     @property
     def ready(self) -> bool:
-        """Whether it can be begun: a generator needs its tokenizer."""
-        needed = self.out / "tokenizer" / "checkpoint.safetensors"
-        return not isinstance(self.training, GeneratorTraining) or needed.is_file()
+        """Whether it can be begun: a generator needs its tokenizer, a refit both."""
+        needed = {GeneratorTraining: ("tokenizer",), RefitTraining: ("tokenizer", "generator")}
+        parts = needed.get(type(self.training), ())
+        return all((self.out / part / "checkpoint.safetensors").is_file() for part in parts)
 
     @property
     def done(self) -> bool:

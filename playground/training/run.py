@@ -110,6 +110,8 @@ def part_of(training: Training) -> str:
     """The folder of a run inside its output folder."""
     if isinstance(training, EvaluatorTraining):
         return training.model.kind
+    if isinstance(training, RefitTraining):
+        return "refit/tokenizer"
     return "tokenizer" if isinstance(training, TokenizerTraining) else "generator"
 
 
