@@ -30,6 +30,19 @@ class Cited:
                 return row[self.columns.index(column)]
         raise PlaygroundError(f"no number is quoted for {label!r}, {column!r} in {self.item}")
 
+    @property
+    def printed(self) -> tuple[tuple[str, ...], ...]:
+        """The rows as text: a column has as many places behind the point as its longest number; a dash for None."""
+        columns = [self._printed(column) for column in zip(*self.rows, strict=True)]
+        return tuple(zip(*columns, strict=True))
+
+    @staticmethod
+    def _printed(column: tuple[Cell, ...]) -> list[str]:
+        places = max((len(repr(cell).partition(".")[2]) for cell in column if isinstance(cell, float)), default=0)
+        return [
+            "–" if cell is None else f"{cell:.{places}f}" if isinstance(cell, float) else str(cell) for cell in column
+        ]
+
 
 @cache
 def _all() -> dict[str, Any]:

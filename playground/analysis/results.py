@@ -9,6 +9,7 @@ A measured number in a row is {"mean", "ci95", "n"}, with a null mean and a "why
 number stands as it is. What further keys there are is told where the item is made. No caption of the data set.
 """
 
+import hashlib
 import json
 import math
 import os
@@ -19,10 +20,13 @@ from typing import Any
 
 from playground.engine import ASSETS
 from playground.errors import PlaygroundError
+from playground.systems import checkpoint_path, row_of
 
 RESULTS = ASSETS / "results"
 NOT_TRAINED = "not trained yet"
-NOT_MEASURED = "not measured yet"
+NOT_MEASURED = "trained, not measured yet"
+NO_GENERATOR = "has no generator"
+PARTS = {"checkpoint": "tokenizer", "generator": "generator"}  # of a provenance -> of a system
 _KEYS = ("item", "made_by", "provenance", "rows")
 
 
@@ -70,6 +74,12 @@ class Result:
         """The system measured, "" for what belongs to none."""
         return str(self.provenance.get("system", ""))
 
+    @classmethod
+    def of(cls, held: Mapping[str, Any]) -> "Result":
+        """From what a file holds. KeyError if one of the four keys is absent."""
+        more = {key: value for key, value in held.items() if key not in _KEYS}
+        return cls(**{key: held[key] for key in _KEYS}, more=more)
+
     def row(self, **facts: Any) -> dict[str, Any]:
         """The first row with these values; {} where there is none."""
         return next((row for row in self.rows if all(row.get(key) == value for key, value in facts.items())), {})
@@ -112,8 +122,7 @@ def read_result(item: str, system: str = "", folder: Path = RESULTS) -> Result |
         return None
     try:
         held = json.loads(path.read_text(encoding="utf-8"))
-        head = {key: held.pop(key) for key in _KEYS}
-        result = Result(**head, more=held)
+        result = Result.of(held)
         shaped = isinstance(result.rows, list) and all(isinstance(row, dict) for row in result.rows)
         if not shaped or not isinstance(result.provenance, dict) or (result.item, result.system) != (item, system):
             raise ValueError("shape")
@@ -134,6 +143,29 @@ def write_result(result: Result, folder: Path = RESULTS) -> Path:
     partial.write_text(text + "\n", encoding="utf-8")
     os.replace(partial, path)
     return path
+
+
+def files_of(system: str, assets: Path = ASSETS) -> dict[str, str]:
+    """{"checkpoint", "generator"}: digests of a system's files, "" where there is none; what a provenance states."""
+    paths = {key: checkpoint_path(assets, system, part) for key, part in PARTS.items()}
+    return {
+        key: hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else "" for key, path in paths.items()
+    }
+
+
+def is_stale(result: Result, assets: Path = ASSETS) -> bool:
+    """Whether a result was measured on other files of its system than those that are there now."""
+    now = files_of(result.system, assets)
+    return any(result.provenance.get(key, value) != value for key, value in now.items())
+
+
+def why_absent(system: str, draws: bool = True, assets: Path = ASSETS) -> str:
+    """Why there is no result of a system, in a few words. draws: of an item that needs a generator."""
+    row = row_of(system)
+    if draws and row.generator is None:
+        return NO_GENERATOR
+    files = files_of(system, assets)
+    return NOT_MEASURED if files["checkpoint"] and (files["generator"] or not draws) else NOT_TRAINED
 
 
 # ---- a claim of a paper against our numbers --------------------------------------------------------------------------

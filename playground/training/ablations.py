@@ -189,6 +189,12 @@ def results(jobs: Sequence[Job], library: Library, size: str, evaluator: Evaluat
     return {"item": "ablations", "made_by": "make ablations", "provenance": provenance, "rows": rows}
 
 
+def measure_again(library: Path, size: str = "cpu", out: Path = Path("runs/ablations")) -> dict[str, Any]:
+    """What `results` gives for the trainings that are finished under `out`; nothing is trained, nothing is stored."""
+    evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
+    return results(ablation_jobs(out, size), Library.open(library), size, evaluator)
+
+
 def write_json(path: Path, value: dict[str, Any]) -> None:
     """Whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from playground.analysis.results import files_of
 from playground.data.library import Library
 from playground.engine import Engine
 from playground.errors import PlaygroundError
-from playground.evaluation.state import digest
-from playground.systems import checkpoint_path, describe, row_of
+from playground.systems import describe, row_of
 
 if TYPE_CHECKING:
     from playground.evaluation.evaluators import Evaluator
@@ -51,17 +51,11 @@ class Settings:
         return None if self.work is None else self.work / f"{item}-{system}.json"
 
 
-def files_of(engine: Engine, system: str) -> dict[str, str]:
-    """{"checkpoint", "generator"}: digests of a system's files, "" where there is none."""
-    paths = {part: checkpoint_path(engine.assets, system, part) for part in ("tokenizer", "generator")}
-    return {"checkpoint": digest(paths["tokenizer"]), "generator": digest(paths["generator"])}
-
-
 def about(engine: Engine, system: str) -> dict[str, Any]:
     """What a result says of the system that it measured."""
     info = describe(engine.assets, row_of(system))
     size = {"tokens": sum(count for count, _ in engine.scales(system)), "parameters": info.parameters}
-    return {"system": system} | files_of(engine, system) | size
+    return {"system": system} | files_of(system, engine.assets) | size
 
 
 def measured(values: ArrayLike) -> dict[str, Any]:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from playground.analysis.results import RESULTS, Result, read_result
+from playground.analysis.results import RESULTS, Result, files_of, read_result
 from playground.engine import Engine, default_engine
 from playground.errors import PlaygroundError
 from playground.evaluation.published import measures, motions, timing
-from playground.evaluation.published.base import Progress, Settings, files_of
+from playground.evaluation.published.base import Progress, Settings
 from playground.systems import SYSTEMS, checkpoint_path, row_of
 
 Compute = Callable[[str, Settings, Engine, Progress | None], Result]
@@ -84,7 +84,7 @@ def up_to_date(found: Result | None, engine: Engine, settings: Settings) -> bool
     """Whether a stored result is of the files that are there now, and of these settings."""
     if found is None:
         return False
-    wanted = files_of(engine, found.system) | {key: getattr(settings, key) for key in _ASKED}
+    wanted = files_of(found.system, engine.assets) | {key: getattr(settings, key) for key in _ASKED}
     return all(found.provenance[key] == value for key, value in wanted.items() if key in found.provenance)
 
 

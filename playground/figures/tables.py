@@ -1,0 +1,156 @@
+"""Tables as notebooks show them: plain HTML, every cell escaped, a line under them that says what was measured.
+
+`Results` is what evaluation/published gives: system -> its stored result, or None where there is none.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from playground.analysis.cited import cited
+from playground.analysis.results import Estimate, Result, is_stale, verdict, why_absent
+from playground.errors import PlaygroundError
+from playground.systems import SYSTEMS
+
+DASH = "–"
+Results = Mapping[str, Result | None]
+
+
+@dataclass(frozen=True)
+class Table:
+    """columns: heads; rows: as many cells each; title above, caption below."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    title: str = ""
+    caption: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.columns or any(len(row) != len(self.columns) for row in self.rows):
+            raise PlaygroundError(f"every row of a table of {len(self.columns)} columns needs as many cells")
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        left, right = ' style="text-align:left"', ' style="text-align:right"'
+        sides = [left, *[right] * (len(self.columns) - 1)]
+        head = "".join(f"<th{side}>{escape(name)}</th>" for name, side in zip(self.columns, sides, strict=True))
+        body = "".join(
+            "<tr>" + "".join(f"<td{side}>{escape(cell)}</td>" for cell, side in zip(row, sides, strict=True)) + "</tr>"
+            for row in self.rows
+        )
+        title = f"<p><b>{escape(self.title)}</b></p>" if self.title else ""
+        caption = "".join(f"<p><small>{escape(line)}</small></p>" for line in self.caption.splitlines())
+        return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{caption}"
+
+    def __str__(self) -> str:
+        lines = [self.title, " | ".join(self.columns), *(" | ".join(row) for row in self.rows), self.caption]
+        return "\n".join(line for line in lines if line)
+
+
+def cited_table(item: str) -> Table:
+    """What a paper prints, from analysis/cited.json."""
+    found = cited(item)
+    return Table(found.columns, found.printed, found.title, f"{found.where}. {found.note}".strip())
+
+
+def number(value: Estimate, scale: float = 1.0) -> str:
+    """A measured number with its interval, "0.0571 ± 0.0032"; a dash where there is none."""
+    if value.mean is None:
+        return DASH
+    mean = significant(value.mean * scale)
+    places = len(mean.partition(".")[2])
+    return mean if value.ci95 is None else f"{mean} ± {value.ci95 * scale:,.{places}f}"
+
+
+def error_bars(values: Sequence[Estimate]) -> dict[str, Any]:
+    """95 % intervals as plotly draws them; none where no number has one."""
+    shown = any(value.ci95 for value in values)
+    return {
+        "type": "data", "array": [value.ci95 or 0.0 for value in values], "visible": shown, "thickness": 1, "width": 3,
+    }  # fmt: skip
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, never in powers of ten: 433, 27.7, 0.0571, 0."""
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else DASH
+    places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    return f"{value:,.{min(places, 6)}f}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something a paper says of two numbers: that the first is the better one."""
+
+    text: str
+    better: Estimate
+    worse: Estimate
+    lower: bool = True  # is a lower number better?
+
+
+def claims_table(claims: Sequence[Claim], title: str = "Is it seen here?", caption: str = "") -> Table:
+    """Every claim with both numbers and what they say about it."""
+    rows = tuple(
+        (claim.text, number(claim.better), number(claim.worse), verdict(claim.better, claim.worse, lower=claim.lower))
+        for claim in claims
+    )
+    return Table(("what the paper says", "the better one, ours", "the other, ours", "seen here?"), rows, title, caption)
+
+
+# ---- systems side by side ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Column:
+    """A measured column: the number `key` of the row that has the facts `of`, times `scale`."""
+
+    head: str
+    key: str
+    of: tuple[tuple[str, Any], ...] = (("of", "generated"),)
+    scale: float = 1.0
+
+
+def systems_table(
+    results: Results, columns: Sequence[Column], title: str, caption: str = "", *, draws: bool = True, note: str = ""
+) -> Table:
+    """One row a system: its tokens and the columns; where there is no result, why. note: added to the caption."""
+    rows = []
+    for system, result in results.items():
+        head = (SYSTEMS[system].title, str(result.provenance.get("tokens", DASH)) if result else DASH)
+        if result is None:
+            rows.append((*head, why_absent(system, draws), *[DASH] * (len(columns) - 1)))
+            continue
+        values = [result.estimate(column.key, **dict(column.of)) for column in columns]
+        rows.append((*head, *(number(v, c.scale) for v, c in zip(values, columns, strict=True))))
+    lines = "\n".join(line for line in (caption, measured_on(results), *_whys(results, columns), note) if line)
+    return Table(("system", "tokens", *(column.head for column in columns)), tuple(rows), title, lines)
+
+
+def _whys(results: Results, columns: Sequence[Column]) -> list[str]:
+    """Why numbers are missing from results that are there, each reason once."""
+    found = [
+        f"{column.head}: {estimate.why}"
+        for result in results.values()
+        if result is not None
+        for column in columns
+        if (estimate := result.estimate(column.key, **dict(column.of))).mean is None and estimate.why
+    ]
+    return list(dict.fromkeys(found))
+
+
+def measured_on(results: Results) -> str:
+    """What every number was measured on, a line a system; systems whose files have changed since are marked."""
+    lines = [
+        f"{result.line}{'; the checkpoint shipped now is another: make figures' if is_stale(result) else ''}"
+        for result in results.values()
+        if result is not None
+    ]
+    return "\n".join(lines)
+
+
+def of_system(results: Results, system: str, key: str, **facts: Any) -> Estimate:
+    """One number of one system; where there is no result, why."""
+    result = results.get(system)
+    return Estimate(None, why=f"{system} is {why_absent(system)}") if result is None else result.estimate(key, **facts)
