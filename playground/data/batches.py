@@ -182,10 +182,9 @@ class BatchSource:
         after = np.where(speed == 1.0, lengths, after)
         longest = np.minimum(after, LIMITS.max_frames) // unit * unit
         shorter = np.where(coin[3] < c.shorter, np.maximum(longest - unit, unit), longest)
-        units = np.maximum(longest // unit - c.shortest // unit + 1, 1)  # how many lengths a random window can have
-        random = np.where(
-            longest > c.shortest, (c.shortest // unit + (coin[4] * units).astype(np.int64)) * unit, longest
-        )
+        least = max(c.shortest // unit, 1)
+        units = np.maximum(longest // unit - least + 1, 1)  # how many lengths a random window can have
+        random = np.where(longest > c.shortest, (least + (coin[4] * units).astype(np.int64)) * unit, longest)
         rows = np.where(coin[2] < c.whole, shorter, random)
         start = (coin[5] * (after - rows + 1)).astype(np.int64)
         counts = np.array([max(len(self.samples[i].captions), 1) for i in chosen])

@@ -20,6 +20,7 @@ from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
 from playground.nn.rope import rope_angles
 from playground.nn.sampling import Sampling, draw, entropy_bits, guide
+from playground.nn.transfer import on_device
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
 from playground.tokenizers.quantizers import MultiScaleQuantizer, resample_down
@@ -148,7 +149,9 @@ class ScalewiseTransformer(nn.Module):
         self, x: Tensor, text: TextMemory, positions: Tensor, mask: Tensor | None, cache: KeyValueCache | None = None
     ) -> Tensor:
         """All layers on x [B * branches, S, D]; rows with text come first."""
-        rotation = rope_angles(positions.to(x.device), self.config.width // self.config.heads, self.config.rope_base)
+        rotation = rope_angles(
+            on_device(positions, x.device), self.config.width // self.config.heads, self.config.rope_base
+        )
         for index, layer in enumerate(self.layers):
             x = x + layer.drop(self._cross(layer, index, layer.norms[0](x), text))
             attended = layer.self_attention(layer.norms[1](x), rotation=rotation, mask=mask, cache=cache, layer=index)
@@ -171,7 +174,7 @@ class ScalewiseTransformer(nn.Module):
         inputs += [self.embed_sums(total, level) for level, total in enumerate(sums, start=1)]
         x = torch.cat(inputs, dim=1)
         positions = torch.cat([self.positions(level) for level in range(len(self.config.scales))])
-        x = self.run(x, text, positions, self.pattern().to(x.device))
+        x = self.run(x, text, positions, on_device(self.pattern(), x.device))
         return [head(part) for head, part in zip(self.heads, x.split(self.config.scales, dim=1), strict=True)]
 
 

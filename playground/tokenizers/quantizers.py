@@ -29,15 +29,13 @@ def nearest_code(vectors: Tensor, codebook: Tensor, metric: str, temperature: fl
     """
     if metric == "cosine":
         score = vectors @ F.normalize(codebook, dim=-1).T
-        unit = vectors.norm(dim=-1, keepdim=True)  # score / unit is the closeness
     elif metric == "euclidean":
-        score = vectors @ codebook.T - 0.5 * codebook.square().sum(dim=-1)
-        unit = score.new_tensor(0.5)  # up to a constant of the vector
+        score = vectors @ codebook.T - 0.5 * codebook.square().sum(dim=-1)  # half the closeness, but for a constant
     else:
         raise ValueError(f"unknown metric {metric!r}; accepted: {', '.join(METRICS)}")
     if temperature > 0:
-        gumbel = -torch.empty_like(score).exponential_().log()
-        score = score / unit.clamp(min=1e-12) / temperature + gumbel
+        close = 2 * score if metric == "euclidean" else score / vectors.norm(dim=-1, keepdim=True).clamp(min=1e-12)
+        score = close / temperature - torch.empty_like(score).exponential_().log()
     return score.argmax(dim=-1)
 
 
