@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
+from playground.ui.drawing import Change, Wish, read_changes
 from playground.ui.state import OWN_FILE, Scales, State, controls_of
 
 _MADE = "Made by the Motion Token Playground; run it with the Python that the playground is installed in."
@@ -42,20 +43,36 @@ def _tokenize(state: State) -> tuple[str, str]:
 
 
 def _generate(state: State) -> tuple[str, str]:
-    prompt = "None" if state["free"] else _literal(state["prompt"])
-    given = {"seconds": _number(state["seconds"]), "system": _literal(state.system), "seed": str(state["seed"])}
-    names = {"guidance": "g", "cfg": "s", "temperature": "temperature", "top_k": "topk", "top_p": "topp"}
-    given |= {name: _number(state[key]) for name, key in names.items()}
+    seed, takes = int(state["seed"]), int(state["takes"])
     return "Words become a motion, scale by scale.", (
         "from pathlib import Path\n\nfrom playground.engine import default_engine\n"
         "from playground.motion.formats import write_motion\n\n"
-        "engine = default_engine()\nmade = engine.generate(\n"
-        f"    {prompt},\n"
-        + "".join(f"    {name}={value},\n" for name, value in given.items())
-        + ")\n"
+        "engine = default_engine()\n"
+        + _drawn(state, seed, takes)
+        + "".join(f"made = engine.regenerate({_changed(one)})\n" for one in read_changes(state["changes"]))
         + _TOKENS.format(name="made")
         + 'write_motion(made.motion, Path("generated.bvh"))\n'
     )
+
+
+def _drawn(state: State, seed: int, takes: int) -> str:
+    """The lines that give `made`: one motion, or one of several that are drawn together."""
+    prompt = "None" if state["free"] else _literal(state["prompt"])
+    seeds = Wish.seeds_of(seed, takes)
+    given = {"seconds": _number(state["seconds"]), "system": _literal(state.system)}
+    given |= {"seed": str(seed)} if takes == 1 else {"seeds": str(seeds)}
+    names = {"guidance": "g", "cfg": "s", "temperature": "temperature", "top_k": "topk", "top_p": "topp"}
+    given |= {name: _number(state[key]) for name, key in names.items()}
+    arguments = f"    {prompt},\n" + "".join(f"    {name}={value},\n" for name, value in given.items())
+    if takes == 1:
+        return f"made = engine.generate(\n{arguments})\n"
+    return f"takes = engine.generate_many(\n{arguments})\nmade = takes[{min(int(state['take']), takes - 1)}]\n"
+
+
+def _changed(one: Change) -> str:
+    if one.code is None:
+        return f"made, scale={one.scale}, seed={one.seed}"
+    return f"made, scale={one.scale}, position={one.position}, code={one.code}"
 
 
 def _guidance(state: State) -> tuple[str, str]:

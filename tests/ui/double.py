@@ -25,6 +25,7 @@ from playground.results import Decoded, Example, GenerationStep, GuidancePair, T
 from playground.systems import SystemInfo
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens, TokenFile
+from tests.ui.double_drawing import Drawing
 
 SIZES = (1, 2, 3, 4, 6, 8, 12, 18, 26, 36)
 CODES = (128, 128, 192, 192, 256, 256, 320, 320, 384, 384)
@@ -72,7 +73,7 @@ def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
     return index.astype(np.int32), np.zeros(8, np.float32), np.eye(3, 8, dtype=np.float32), scores, places
 
 
-class FakeEngine:
+class FakeEngine(Drawing):
     """What the rooms use of the engine. `pause` is called before every scale of a generation."""
 
     def __init__(self, pause: Callable[[], None] = lambda: None) -> None:

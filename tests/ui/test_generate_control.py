@@ -4,8 +4,9 @@ from typing import Any
 
 import pytest
 
+from playground.ui.drawing import Visit
 from playground.ui.errors import Noted
-from playground.ui.rooms.generate import Control, Handlers
+from playground.ui.rooms.generate import Handlers
 from playground.ui.services import Services
 from tests.ui.double import SIZES, FakeEngine
 
@@ -19,12 +20,12 @@ def do() -> Handlers:
 
 
 def test_it_runs_through_when_nobody_stops_it(do: Handlers) -> None:
-    assert len(list(do.generate(Control(), *CONTROLS))) == len(SIZES)
+    assert len(list(do.generate(Visit(), *CONTROLS))) == len(SIZES)
 
 
 @pytest.mark.parametrize("after", [1, 4, 8])
 def test_a_stop_keeps_the_motion_of_the_scale_it_is_at(do: Handlers, after: int) -> None:
-    control, seen = Control(), []
+    control, seen = Visit(), []
     for values in do.generate(control, *CONTROLS):
         seen.append(values)
         if len(seen) == after:
@@ -36,13 +37,13 @@ def test_a_stop_keeps_the_motion_of_the_scale_it_is_at(do: Handlers, after: int)
 
 
 def test_a_stop_before_the_start_shows_nothing_new(do: Handlers) -> None:
-    control = Control(stop=True)
-    ((stage, facts),) = do.generate(control, *CONTROLS)
+    control = Visit(stop=True)
+    ((stage, facts, *_),) = do.generate(control, *CONTROLS)
     assert isinstance(stage, Noted) and "before the first scale" in stage.text
     assert stage.value == facts  # both leave what is there
 
 
 def test_the_next_click_forgets_the_stop(do: Handlers) -> None:
-    control = Control(stop=True)
+    control = Visit(stop=True)
     do.begin(control)
     assert len(list(do.generate(control, *CONTROLS))) == len(SIZES)

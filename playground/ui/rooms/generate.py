@@ -1,29 +1,40 @@
-"""Room 4: a motion from words, appearing scale by scale while it is generated."""
+"""Room 4: motions from words, appearing scale by scale; a token's alternatives; what the visit has made so far."""
 
-import time
-from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass
+from collections.abc import Iterator
+from dataclasses import astuple
 from functools import partial
 from typing import Any
 
 import gradio as gr
-import numpy as np
 
+from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.systems import SamplingDefaults
-from playground.text.prompts import normalise
+from playground.ui.drawing import (
+    WISHES,
+    Change,
+    Drawing,
+    Result,
+    Visit,
+    Wish,
+    change,
+    draw,
+    last_of,
+    read_changes,
+    write_changes,
+)
 from playground.ui.errors import Noted, attach, message_place
-from playground.ui.facts import Fact, significant
+from playground.ui.generated import drawing_view, earlier, onward, result_view, token_card
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import asked, commits, link_door
-from playground.ui.scenes import generated_scene, token_facts
+from playground.ui.picker import picker
 from playground.ui.services import Services
+from playground.ui.stage.component import stage_call
 from playground.ui.state import control
-from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
 NAME = "generate"
-LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens with every one of them."
+LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens. Then click a token."
 PROMPTS = (
     control(NAME, "prompt").default,
     "someone jogs",
@@ -32,156 +43,210 @@ PROMPTS = (
 )
 OPENING_SECONDS = float(control(NAME, "seconds").default)
 DOING = "Choosing the first tokens"
-ENTROPY_CARD = (
-    "How undecided the generator was, on average over its tokens: at 0 bit one code was certain, at 3 bit it was like "
-    "drawing one of eight. Faint cells are unsure ones."
+GUIDANCES = (
+    "Two guidances: <b>s</b> acts while tokens are chosen and makes them follow the words; <b>g</b> leaves the tokens "
+    "as they are and changes how they are read."
 )
-
-
 STEPS = (0.1, 0.1, 0.05, 0.01, 0.01)  # of the sampling sliders
-WISHES = ("prompt", "free", "seconds", "seed", "g", "s", "temperature", "topk", "topp")  # keys of state.CONTROLS
-
-
-@dataclass(frozen=True)
-class Wish:
-    """What is asked of the generator, checked."""
-
-    prompt: str | None
-    seconds: float
-    seed: int
-    guidance: float
-    cfg: float
-    temperature: float
-    top_k: float
-    top_p: float
-
-    @classmethod
-    def checked(cls, prompt: object, free: object, *numbers: object) -> "Wish":
-        """From the controls as they come; PlaygroundError with one sentence for what does not fit."""
-        words = None if free is True else normalise(prompt)  # type: ignore[arg-type]
-        bounds = (
-            ("the length in seconds", LIMITS.min_seconds, LIMITS.max_seconds),
-            ("the seed", 0, LIMITS.max_seed),
-            ("the decoder's guidance", 0, LIMITS.max_guidance),
-            ("the generator's guidance", 0, LIMITS.max_guidance),
-            ("the temperature", 0, LIMITS.max_temperature),
-            ("top-k", 0.01, 1),
-            ("top-p", 0.05, 1),
-        )
-        seconds, seed, *rest = (checked_number(n, *bound) for n, bound in zip(numbers, bounds, strict=True))
-        return cls(words, seconds, int(seed), *rest)
-
-
-@dataclass
-class Control:
-    """The one object that a visitor's running generation and the "Stop" button share."""
-
-    stop: bool = False
+KEEP = "(changes, take) => window.mtpState?.keep('generate', ['changes', 'take'], [changes || null, +take || null])"
+SKIP = gr.skip()
+SHOWN = 7 + len(WISHES)  # values that show a result
 
 
 def stream(services: Services, wish: Wish) -> Iterator[View]:
     """One view after every scale; the last one is the result."""
-    began = time.perf_counter()
-    engine, system = services.engine(), services.default_system()
-    sizes, palettes = services.scales(system.name), services.palettes(system.name)
-    steps = engine.generate_steps(
-        wish.prompt, wish.seconds, system=system.name, seed=wish.seed, guidance=wish.guidance, cfg=wish.cfg,
-        temperature=wish.temperature, top_k=wish.top_k, top_p=wish.top_p,
-    )  # fmt: skip
-    for step in steps:
-        yield View(
-            stage=generated_scene(system, step.motion, step.levels, step.entropy, palettes, sizes),
-            facts=(*token_facts(step.levels), entropy_fact(step.entropy)),
-            controls={"prompt": wish.prompt or "", "level": len(step.levels), "count": len(sizes)},
-            seconds=time.perf_counter() - began,
-        )
-
-
-def entropy_fact(entropy: Sequence[Any]) -> Fact:
-    """Mean entropy over all tokens so far."""
-    mean = (
-        float(np.concatenate([np.asarray(row, np.float64) for row in entropy]).mean()) if len(entropy) else float("nan")
-    )
-    return Fact(f"{significant(mean)} bit", "mean entropy", ENTROPY_CARD)
+    for drawing in draw(services, wish):
+        yield drawing_view(services, drawing)
 
 
 def opening_view(services: Services) -> View:
     """The room's first result: the first prompt, seed 0."""
-    numbers = astuple(services.sampling())
-    *_, last = stream(services, Wish.checked(PROMPTS[0], False, OPENING_SECONDS, 0, *numbers))
+    *_, last = stream(services, opening_wish(services))
     return last
 
 
+def opening_wish(services: Services) -> Wish:
+    """What the room opens with."""
+    return Wish.checked(PROMPTS[0], False, OPENING_SECONDS, 0, *astuple(services.sampling()))
+
+
 class Handlers:
-    """What the controls do. A generation looks at its control after every scale, so that stopping waits for nobody."""
+    """What the controls do. A generation looks at its visit after every scale, so that stopping waits for nobody.
+
+    A handler that shows a result returns the values of SHOWN in `room`: stage, facts, where to go next, the visit's
+    list, the choice among several motions, the changes for the address, the token's card.
+    """
 
     def __init__(self, services: Services) -> None:
         self.services = services
 
-    def fill(self, event: gr.EventData) -> tuple[Any, ...]:
+    def fill(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
         """The controls as a link asks for them, in the order of `Wish.checked`."""
         state, own = asked(event), self.services.sampling()
         usual = {"g": own.guidance, "s": own.cfg, "temperature": own.temperature, "topk": own.top_k, "topp": own.top_p}
+        visit.wanted, visit.take = read_changes(state["changes"]), int(state["take"])
         return tuple(state.values.get(key, usual.get(key, state[key])) for key in WISHES)
 
-    def begin(self, control: Control) -> tuple[Any, ...]:
+    def begin(self, visit: Visit) -> tuple[Any, ...]:
         """At the click, before any waiting: "Stop" becomes possible and "Generate" does not."""
-        control.stop = False
+        visit.stop = False
         return gr.update(interactive=False), gr.update(interactive=True)
 
-    def stop(self, control: Control) -> Any:
+    def stop(self, visit: Visit) -> Any:
         """Ask the running generation to end after the scale it is at."""
-        control.stop = True
+        visit.stop = True
         return gr.update(interactive=False)
 
     def end(self) -> tuple[Any, ...]:
         """After the last word: "Generate" becomes possible again."""
         return gr.update(interactive=True), gr.update(interactive=False)
 
-    def generate(self, control: Control, *values: Any) -> Iterator[tuple[Any, ...]]:
-        """Stage and facts after every scale."""
+    def generate(self, visit: Visit, *values: Any) -> Iterator[tuple[Any, ...]]:
+        """The stage after every scale, and at the end all that belongs to the result."""
         wish = Wish.checked(*values)
-        if control.stop:
-            yield Noted(gr.skip(), "Stopped before the first scale was done."), gr.skip()
+        wanted, visit.wanted, visit.token = visit.wanted, (), None
+        if visit.stop:
+            yield Noted(SKIP, "Stopped before the first scale was done."), *[SKIP] * (SHOWN - 1)
             return
-        for view in stream(self.services, wish):
-            level, count = view.controls["level"], view.controls["count"]
-            halted = control.stop and level < count
-            note = f"Stopped; this is the motion after scale {level} of {count}." if halted else ""
-            yield Noted(view.stage_json(), note), view.facts_html()
-            if halted:
+        yield from self._run(visit, draw(self.services, wish))
+        for one in wanted:
+            if visit.shown is not None and not visit.halted:
+                yield from self._run(visit, change(self.services, visit.shown, visit.take, one))
+
+    def choose(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
+        """A click in the card of a token, before any waiting."""
+        visit.picked = str(event.id)
+        return self.begin(visit)
+
+    def redraw(self, visit: Visit) -> Iterator[tuple[Any, ...]]:
+        """From the token's scale on, with the code that was clicked forced, or with another seed."""
+        result = self._held(visit)
+        if visit.token is None:
+            raise PlaygroundError("choose a token in the score first")
+        scale, position = visit.token
+        kind, _, code = visit.picked.partition(":")
+        other = (result.takes[visit.take].seed + 1) % LIMITS.max_seed
+        wanted = Change(scale, position, int(code)) if kind == "code" else Change(scale, seed=other)
+        yield from self._run(visit, change(self.services, result, visit.take, wanted))
+
+    def token(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
+        """A click on a token: its card; none where none is chosen."""
+        if not event.selection:
+            visit.token = None
+            return ("",)
+        result = self._held(visit)
+        visit.token = int(event.selection["scale"]), int(event.selection["position"])
+        return (self._card(visit, result),)
+
+    def bring_back(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
+        """A result of the visit, at once, with the controls that made it."""
+        result = visit.open(int(event.id))
+        return self._result(visit, result, result_view(self.services, result))
+
+    def look_at(self, visit: Visit, place: str) -> tuple[Any, ...]:
+        """Another one of several motions: its tokens."""
+        result = self._held(visit)
+        visit.take = min(max(0, int(place)), len(result.takes) - 1)
+        return self._result(visit, result, result_view(self.services, result, visit.take))
+
+    def _run(self, visit: Visit, run: Iterator[Drawing]) -> Iterator[tuple[Any, ...]]:
+        for drawing in run:
+            result = drawing.result
+            if result is not None:
+                visit.keep(result)
+                yield self._result(visit, result, drawing_view(self.services, drawing, visit.take))
                 return
+            view = drawing_view(self.services, drawing, visit.take)
+            visit.halted = visit.stop
+            level, count = view.controls["level"], view.controls["count"]
+            note = f"Stopped; this is the motion after scale {level} of {count}." if visit.halted else ""
+            yield Noted(view.stage_json(), note), view.facts_html(), *[SKIP] * (SHOWN - 2)
+            if visit.halted:
+                return
+
+    def _result(self, visit: Visit, result: Result, view: View) -> tuple[Any, ...]:
+        choices = [(f"Seed {one.seed}", str(n)) for n, one in enumerate(result.takes)]
+        which = gr.update(choices=choices, value=str(visit.take), visible=len(choices) > 1)
+        card = self._card(visit, result) if visit.token else ""
+        told = ", then ".join(one.words for one in result.changes)
+        stage = Noted(view.stage_json(), f"{told[:1].upper()}{told[1:]}." if told else "")
+        told_of = (onward(result, visit.take), earlier(visit), which, write_changes(result.changes), card)
+        return stage, view.facts_html(), *told_of, *(result.address[key] for key in WISHES)
+
+    def _card(self, visit: Visit, result: Result) -> str:
+        assert visit.token is not None
+        made, (scale, position) = result.takes[visit.take], visit.token
+        found = self.services.engine().alternatives(made, scale, position)
+        palette = self.services.palettes(made.system)[scale - 1]
+        colors = ["#{:02x}{:02x}{:02x}".format(*palette[code]) for code in found.codes]
+        return token_card(found, made.levels[scale - 1].size, colors)
+
+    def _held(self, visit: Visit) -> Result:
+        """What is on the screen; the stored opening is drawn once more when something is asked of it."""
+        if visit.halted:
+            raise PlaygroundError("this motion was stopped on its way; generate it to the end to look into its tokens")
+        if visit.shown is None:
+            visit.keep(last_of(draw(self.services, opening_wish(self.services))))
+        assert visit.shown is not None
+        return visit.shown
 
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
-    running = gr.State(Control(), time_to_live=LIMITS.session_seconds)
+    visit = gr.State(Visit(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
         with panel("Words become a motion", LEAD):
-            prompt, seconds, seed, go, cancel = _controls(opening)
+            card = picker("generate-token", stage=NAME)
+            with gr.Column(elem_classes=["mtp-form"], min_width=0):
+                prompt, seconds, seed, takes, buttons = _controls(opening)
+            which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="generate-take")
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
+            further = gr.HTML("", elem_id="generate-onward", apply_default_css=False)
+            shelf = picker("generate-earlier", stage=NAME)
             free, *numbers = _knobs(services.sampling())
         words(NAME)
         door = link_door(NAME)
-    do = Handlers(services)
-    wishes = [prompt, free, seconds, seed, *numbers]
-    buttons = [go, cancel]
+        changes = gr.Textbox("", elem_classes=["mtp-unseen"], show_label=False, container=False)
+    wishes = [prompt, free, seconds, seed, *numbers, takes]
+    shown = [stage, facts, further, shelf, which, changes, card, *wishes]
+    _wire(Handlers(services), visit, message, shown, buttons, door)
+
+
+def _wire(do: Handlers, visit: Any, message: Any, shown: list[Any], buttons: list[Any], door: Any) -> None:
+    """What happens at which event."""
+    stage, _, _, shelf, which, changes, card, *wishes = shown
+    prompt, (go, cancel) = wishes[0], buttons
     quick: dict[str, Any] = {"queue": False, "api_visibility": "private", "show_progress": "hidden"}
-    filled = attach(door.arrive, do.fill, [], wishes, message, model=False)
+    silent: dict[str, Any] = {"api_visibility": "private"}
+    keys = dict(zip(WISHES, wishes, strict=True))
+    filled = attach(door.arrive, do.fill, [visit], wishes, message, model=False)
     for event in (go.click, prompt.submit, filled.then):
-        started = event(do.begin, [running], buttons, **quick)
-        run = attach(started.then, do.generate, [running, *wishes], [stage, facts], message, stage=NAME, doing=DOING)
+        started = event(do.begin, [visit], buttons, **quick)
+        run = attach(started.then, do.generate, [visit, *wishes], shown, message, stage=NAME, doing=DOING)
+        run.then(None, [changes, which], None, js=KEEP, **silent)
         ended = run.then(do.end, None, buttons, **quick)
-    ended.then(None, None, None, js=f"() => window.mtpState?.settled('{NAME}')", api_visibility="private")
-    commits(NAME, dict(zip(WISHES, wishes, strict=True)), go.click, prompt.submit, forget=("selection",))
-    cancel.click(do.stop, [running], [cancel], **quick)
+    ended.then(None, None, None, js=f"() => window.mtpState?.settled('{NAME}')", **silent)
+    for event in (go.click, prompt.submit, shelf.pick):
+        event(None, None, None, js=stage_call(NAME, "select", None), **silent)
+    commits(NAME, keys, go.click, prompt.submit, forget=("selection", "changes", "take"))
+    cancel.click(do.stop, [visit], [cancel], **quick)
+
+    attach(stage.select, do.token, [visit], [card], message, trigger_mode="always_last")
+    started = card.pick(do.choose, [visit], buttons, **quick)
+    again = attach(started.then, do.redraw, [visit], shown, message, stage=NAME, doing="Drawing anew")
+    again.then(do.end, None, buttons, **quick)
+    back = attach(shelf.pick, do.bring_back, [visit], shown, message, model=False)
+    look = attach(which.input, do.look_at, [visit, which], shown, message, model=False)
+    for run in (again, back, look):
+        run.then(None, [changes, which], None, js=KEEP, **silent)
+    commits(NAME, keys, again.then, back.then)
 
 
 def _controls(opening: View) -> tuple[Any, ...]:
-    """The controls from top to bottom: prompt, seconds, seed, "Generate", "Stop"."""
+    """The controls from top to bottom: prompt, seconds, seed, seeds side by side, "Generate" and "Stop"."""
     prompt = gr.Textbox(
         opening.controls.get("prompt", PROMPTS[0]), label="Prompt", lines=2, max_lines=3,
         placeholder=PROMPTS[0], elem_id="generate-prompt",
@@ -194,20 +259,27 @@ def _controls(opening: View) -> tuple[Any, ...]:
         )  # fmt: skip
         seed = gr.Number(
             0, label="Seed", precision=0, minimum=0, maximum=LIMITS.max_seed, elem_id="generate-seed",
-            min_width=80, scale=0,
+            min_width=72, scale=0,
+        )  # fmt: skip
+        takes = gr.Number(
+            1, label=control(NAME, "takes").label, precision=0, minimum=1, maximum=LIMITS.max_seeds,
+            elem_id="generate-takes", min_width=96, scale=0,
         )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line"]):
         go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
         cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
-    return prompt, seconds, seed, go, cancel
+    return prompt, seconds, seed, takes, [go, cancel]
 
 
 def _knobs(default: SamplingDefaults) -> list[Any]:
     """The folded sampling controls in the order of `Wish.checked`; the first one is free-form."""
-    with gr.Accordion("Sampling", open=False, elem_classes=["mtp-knobs"]), gr.Row(elem_classes=["mtp-pairs"]):
-        guidance, cfg, temperature, top_k, top_p = (
-            gr.Slider(row.low, row.high, value, step=step, label=row.label, elem_id=row.element)
-            for row, value, step in zip(map(partial(control, NAME), WISHES[4:]), astuple(default), STEPS, strict=True)
-        )
-        free = gr.Checkbox(False, label=control(NAME, "free").label, elem_id="generate-free")
+    with gr.Accordion("Sampling and guidance", open=False, elem_classes=["mtp-knobs"]):
+        gr.HTML(f'<p class="mtp-aside">{GUIDANCES}</p>', apply_default_css=False)
+        with gr.Row(elem_classes=["mtp-pairs"]):
+            rows = map(partial(control, NAME), WISHES[4:9])
+            guidance, cfg, temperature, top_k, top_p = (
+                gr.Slider(row.low, row.high, value, step=step, label=row.label, elem_id=row.element)
+                for row, value, step in zip(rows, astuple(default), STEPS, strict=True)
+            )
+            free = gr.Checkbox(False, label=control(NAME, "free").label, elem_id="generate-free")
     return [free, guidance, cfg, temperature, top_k, top_p]

@@ -1,0 +1,134 @@
+"""What the room Generate shows: one or several motions with the score of one of them, a token's card, the visit."""
+
+import html
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from playground.figures import stage as scene
+from playground.results import Generation, GenerationStep
+from playground.ui.cards import term
+from playground.ui.drawing import Drawing, Result, Visit, Wish, made_name
+from playground.ui.facts import Fact, significant
+from playground.ui.picker import Entry, shelf
+from playground.ui.scenes import score, token_facts
+from playground.ui.services import Services
+from playground.ui.state import State, query
+from playground.ui.view import View
+
+if TYPE_CHECKING:
+    from playground.findings import Alternatives
+
+CHANGED = "another code than before"
+BEFORE = "before"
+Made = GenerationStep | Generation
+
+
+def drawing_view(services: Services, drawing: Drawing, take: int = 0) -> View:
+    """A run on its way, or at its end; `take` is the motion whose tokens the score shows."""
+    return _view(services, drawing.steps, drawing.wish, drawing.before, take, drawing.seconds)
+
+
+def result_view(services: Services, result: Result, take: int = 0) -> View:
+    """A finished result."""
+    return _view(services, result.takes, result.wish, result.before, take, result.takes[0].seconds)
+
+
+def _view(
+    services: Services, made: Sequence[Made], wish: Wish, before: Generation | None, take: int, seconds: float
+) -> View:
+    system, take = services.default_system(), min(take, len(made) - 1)
+    shown, names = made[take], [f"Seed {seed}" for seed in wish.seeds]
+    if len(made) == 1:
+        names = ["After" if before else "Generated"]
+    sizes = services.scales(system.name)
+    level, several = len(shown.levels), len(made) > 1
+    growing = f"scale {level} of {len(sizes)}" if level < len(sizes) else ""
+    figures = [scene.figure(BEFORE, "Before", before.motion.joints, system.name)] if before else []
+    ghost = BEFORE if before else None
+    for n, (one, name) in enumerate(zip(made, names, strict=True)):
+        told = growing or ("its tokens are below" if several and n == take else "")
+        id = f"made{n or ''}"
+        figures.append(scene.figure(id, name, one.motion.joints, system.name, told, ghost_of=ghost))
+    marks = [new.ids != old.ids for new, old in zip(shown.levels, before.levels, strict=False)] if before else None
+    track = score(
+        system, shown.motion.frames, shown.levels, services.palettes(system.name), shown.entropy, sizes, None, marks,
+        CHANGED,
+    )  # fmt: skip
+    if several:
+        track["name"] = f"{track['name']}, {names[take][:1].lower()}{names[take][1:]}"
+    return View(
+        stage=scene.payload(figures, [track], scene=f"{wish.prompt}, {wish.seconds}"),
+        facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)),
+        controls={"prompt": wish.prompt or "", "level": level, "count": len(sizes)},
+        seconds=seconds,
+    )
+
+
+def entropy_fact(entropy: Sequence[Any]) -> Fact:
+    """Mean entropy over all tokens so far."""
+    mean = (
+        float(np.concatenate([np.asarray(row, np.float64) for row in entropy]).mean()) if len(entropy) else float("nan")
+    )
+    return Fact(f"{significant(mean)} bit", "mean entropy", term("entropy"))
+
+
+def earlier(visit: Visit) -> str:
+    """The list of the visit, newest first; "" while there is nothing to go back to."""
+    if len(visit.results) < 2:
+        return ""
+    entries = [Entry(str(n), one.title, one is visit.shown) for n, one in enumerate(visit.results)]
+    return shelf("This visit", entries[::-1])
+
+
+def onward(result: Result, take: int) -> str:
+    """Where this motion can be taken next: links that the page follows without leaving."""
+    wish, made = result.wish, result.takes[take]
+    links, name = [], made_name(result, take)
+    if name:
+        links.append(("Edit this motion", State("edit", {"motion": name, "caption": wish.prompt or ""})))
+    if wish.prompt:
+        asked = {"prompt": wish.prompt, "seconds": wish.seconds, "seed": made.seed}
+        links.append(("Compare settings", State("compare", {"vary": "s", **asked})))
+    parts = [f'<a data-state href="{html.escape(query(state), quote=True)}">{text}</a>' for text, state in links]
+    return f'<p class="mtp-aside mtp-onward">{" · ".join(parts)}</p>'
+
+
+def token_card(found: "Alternatives", size: int, color: Sequence[str]) -> str:
+    """What else a token could have been, as buttons. size: tokens of its scale; color: of each code listed."""
+    place = f"scale {found.scale}, token {found.position + 1} of {size}"
+    told = (
+        f"Its chance was {_share(found.chosen_probability)}; the generator was {significant(found.entropy)} bit "
+        "undecided here."
+    )
+    most = float(max(found.probabilities.max(), 1e-9))
+    rows = "".join(
+        _row(int(code), float(share), float(chance), most, tint, int(code) == found.chosen)
+        for code, share, chance, tint in zip(found.codes, found.probabilities, found.chances, color, strict=True)
+    )
+    redrawn = "all other tokens" if found.scale == 1 else f"everything from scale {found.scale} on"
+    stay = {1: "", 2: "; scale 1 stays"}.get(found.scale, f"; scales 1 to {found.scale - 1} stay")
+    return (
+        f'<section class="mtp-drawn" aria-label="The chosen token"><header><h2>Code {found.chosen}</h2>'
+        f'<span>{place}</span><button type="button" class="mtp-back" data-close>Back to the prompt</button></header>'
+        f"<p>{told} Click another code to put it here and draw {redrawn} anew{stay}.</p>"
+        f'<div class="mtp-codes">{rows}</div>'
+        f'<button type="button" class="mtp-anew" data-pick="anew">Draw anew from scale {found.scale} with another seed'
+        "</button></section>"
+    )
+
+
+def _row(code: int, share: float, chance: float, most: float, tint: str, chosen: bool) -> str:
+    note = "now here" if chosen else "" if chance > 0 else "cut off (top-k, top-p)"
+    width = round(100 * share / most)
+    return (
+        f'<button type="button" data-pick="code:{code}"{" disabled" if chosen else ""}'
+        f' aria-label="Code {code}, {_share(share)}{", " + note if note else ""}">'
+        f'<i style="background:{tint}"></i><b>{code}</b><span class="mtp-bar"><i style="width:{width}%"></i></span>'
+        f"<span>{_share(share)}</span><small>{note}</small></button>"
+    )
+
+
+def _share(value: float) -> str:
+    return f"{significant(100 * value)} %" if value >= 1e-4 else "below 0.01 %"

@@ -1,0 +1,86 @@
+"""Generate as a visitor uses it: tokens looked into and forced, seeds side by side, the visit's list, links, stop."""
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import PHONE, Visit
+
+pytestmark = pytest.mark.browser
+Go = Callable[..., Visit]
+DONE = """(n) => {
+  const data = window.MotionStage?.get('generate')?.data;
+  return data?.figures.length === n && data.tracks[0].levels[9].ids;
+}"""
+IDS = "() => MotionStage.get('generate').data.tracks[0].levels.map((level) => Array.from(level.ids ?? []))"
+
+
+@pytest.fixture
+def seen(visit: Go, stand_in: str) -> Visit:
+    found = visit(f"{stand_in}?room=generate")
+    found.page.wait_for_function(DONE, arg=1)
+    found.settle()
+    return found
+
+
+def pick_token(page: Page) -> None:
+    """The token at scale 3, position 1, by a click where it stands."""
+    page.evaluate(
+        "() => MotionStage.get('generate').store.commit('select',"
+        " { selection: { system: 'lgtok-lite', scale: 3, position: 1 } })"
+    )
+    expect(page.locator("#generate-token .mtp-drawn")).to_contain_text("scale 3, token 2 of 3")
+
+
+def test_a_token_is_forced_and_the_visit_leads_back(seen: Visit) -> None:
+    page = seen.page
+    first = page.evaluate(IDS)
+    pick_token(page)
+    expect(page.locator("#generate-prompt")).not_to_be_visible()
+    page.locator("#generate-token [data-pick^=code]:enabled").first.click()
+    page.wait_for_function(DONE, arg=2)
+    expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Before")
+    expect(page.locator("#generate-message")).to_contain_text("token 2 set to code")
+    expect(page.locator("#generate-score .ms-key")).to_contain_text("another code than before")
+    changed = page.evaluate(IDS)
+    assert changed[:2] == first[:2] and changed[3:] != first[3:]
+    assert "changes=3.1." in page.url
+    page.get_by_role("button", name="Back to the prompt").click()
+    expect(page.locator("#generate-prompt")).to_be_visible()
+    page.locator("#generate-earlier button").last.click()
+    page.wait_for_function(DONE, arg=1)
+    assert page.evaluate(IDS) == first and "changes" not in page.url
+    assert seen.complaints == []
+
+
+def test_seeds_stand_side_by_side_and_their_link_shows_the_same(seen: Visit, visit: Go) -> None:
+    page = seen.page
+    page.locator("#generate-takes input").fill("3")
+    page.locator("#generate-seed input").fill("5")
+    page.locator("#generate-go").click()
+    page.wait_for_function(DONE, arg=3)
+    expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Seed 6")
+    page.get_by_role("radio", name="Seed 7").check()
+    expect(page.locator("#generate-score .ms-heads")).to_contain_text("seed 7")
+    page.wait_for_url(lambda url: "take=2" in url)
+    shown, address = page.evaluate(IDS), page.url
+    other = visit(address).page
+    other.wait_for_function(DONE, arg=3)
+    expect(other.locator("#generate-score .ms-heads")).to_contain_text("seed 7")
+    assert other.evaluate(IDS) == shown
+
+
+def test_stopping_keeps_what_there_is(seen: Visit) -> None:
+    page = seen.page
+    page.locator("#generate-go").click()
+    page.locator("#generate-stop").click()  # possible as soon as it runs
+    expect(page.locator("#generate-message")).to_contain_text("Stopped")
+    expect(page.locator("#generate-go")).to_be_enabled()
+
+
+def test_a_phone_shows_the_card_of_a_token(visit: Go, stand_in: str) -> None:
+    page = visit(f"{stand_in}?room=generate", viewport=PHONE, has_touch=True, is_mobile=True).page
+    page.wait_for_function(DONE, arg=1)
+    pick_token(page)
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
