@@ -31,6 +31,7 @@ class Limits:
     min_edit_frames: int = 4  # shortest run of frames that is drawn anew, and that must stay
     queue_size: int = 20  # visitors waiting for the model
     sessions: int = 200  # visitors whose open motion is kept in memory
+    history: int = 12  # results of a visit that can be brought back
     session_seconds: int = 3_600  # how long it is kept, and an uploaded file too
     deadline_seconds: float = 30.0  # one live request, checked at every scale
     max_link_chars: int = 4_000  # of an address that is read
