@@ -20,7 +20,7 @@ from typing import Any
 
 from playground.engine import ASSETS
 from playground.errors import PlaygroundError
-from playground.systems import checkpoint_path, row_of
+from playground.systems import SYSTEMS, checkpoint_path, row_of
 
 RESULTS = ASSETS / "results"
 NOT_TRAINED = "not trained yet"
@@ -71,8 +71,9 @@ class Result:
 
     @property
     def system(self) -> str:
-        """The system measured, "" for what belongs to none."""
-        return str(self.provenance.get("system", ""))
+        """The system of the table that was measured, "" for what belongs to no single one."""
+        name = str(self.provenance.get("system", ""))
+        return name if name in SYSTEMS else ""
 
     @classmethod
     def of(cls, held: Mapping[str, Any]) -> "Result":

@@ -12,10 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from playground.analysis.bundle import DECODED_NOTE, Bundle, BundleClip, counts_of, read_bundle, write_bundle
+from playground.analysis.bundle import (
+    DECODED_NOTE,
+    Bundle,
+    BundleClip,
+    counts_of,
+    read_bundle,
+    stored_systems,
+    write_bundle,
+)
 from playground.analysis.embedding import EmbeddingMap, neighbour_agreement
 from playground.analysis.passes import ClipPass, clip_passes, first_caption
 from playground.analysis.phrases import group_of, sentence
+from playground.analysis.results import files_of, why_absent
 from playground.analysis.tokenmap import map_tokens
 from playground.data.library import Library
 from playground.engine import ASSETS, Engine, default_engine
@@ -96,6 +105,35 @@ def analysis_of(
     if library is None:
         return read_bundle(folder, system)
     return build_bundle(system, Path(library), split, seed=seed, limit=limit)
+
+
+def analyses_of(
+    systems: Sequence[str],
+    *,
+    recompute: bool = False,
+    library: str | Path = "library",
+    split: str = "test",
+    limit: int | None = None,
+    seed: int = 0,
+    folder: Path = ASSETS / "analysis",
+) -> tuple[dict[str, Bundle], dict[str, str]]:
+    """The analyses of those systems that have one, and for the others why there is none: what the notebooks call.
+
+    recompute: computed now for every system that has a tokenizer, on at most `limit` clips of the split.
+    PlaygroundError if there is none at all.
+    """
+    there = {name: bool(files_of(name)["checkpoint"]) if recompute else name in stored_systems(folder)
+             for name in systems}  # fmt: skip
+    found = {
+        name: analysis_of(
+            name, library=library if recompute else None, split=split, limit=limit, seed=seed, folder=folder
+        )
+        for name, wanted in there.items()
+        if wanted
+    }
+    if not found:
+        raise PlaygroundError(f"none of {', '.join(systems)} is trained and analysed here")
+    return found, {name: why_absent(name, draws=False) for name, wanted in there.items() if not wanted}
 
 
 def _clip(library: Library, one: ClipPass) -> BundleClip:
