@@ -178,7 +178,8 @@ class RefitTask:
         """Write the whole tokenizer, what it was with the refitted detokenizer, and in the folder `generator` beside
         its own the generator, which names the new tokenizer: the tokens are the same."""
         refit = {key: facts[key] for key in ("step", "seconds")} | {"from": self.card.hash[:12]}
-        merged = self.card.facts | {"refit": refit, "validation": facts["validation"]}
+        refits = [*self.card.facts.get("refit", []), refit]  # one may follow another
+        merged = self.card.facts | {"refit": refits, "validation": facts["validation"]}
         save_checkpoint(path, self.tokenizer, replace(self.card, facts=merged))
         network, card = self.generator
         named = card.facts | {"tokenizer": read_card(path).hash[:12]}

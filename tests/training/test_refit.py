@@ -58,7 +58,8 @@ def test_only_the_detokenizer_moves_and_the_pair_belongs_together(trained):
     assert moved and all(name.removeprefix("model.").split(".")[0] in REFIT for name in moved)
     _, old = load_tokenizer(out / "tokenizer" / "checkpoint.safetensors")
     _, card = load_tokenizer(out / "refit" / "tokenizer" / "checkpoint.safetensors")
-    assert card.facts["refit"]["from"] == old.hash[:12] and card.facts["refit"]["step"] == 3
+    assert len(card.facts["refit"]) == 1
+    assert card.facts["refit"][0]["from"] == old.hash[:12] and card.facts["refit"][0]["step"] == 3
     assert card.facts["step"] == old.facts["step"] and card.facts["validation"] != old.facts["validation"]
     _, generator = load_generator(out / "refit" / "generator" / "checkpoint.safetensors")
     assert generator.facts["tokenizer"] == card.hash[:12]
