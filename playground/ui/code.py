@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
-from playground.ui.drawing import Change, Wish, read_changes
-from playground.ui.state import OWN_FILE, Scales, State, controls_of
+from playground.ui.drawing import MADE, Change, Wish, read_changes, read_name
+from playground.ui.state import OWN_FILE, Scales, State, Token, controls_of
 
 _MADE = "Made by the Motion Token Playground; run it with the Python that the playground is installed in."
 _TOKENS = """
@@ -39,7 +39,28 @@ def _tokenize(state: State) -> tuple[str, str]:
         + f"back = engine.reconstruct(tokens{asked})\n"
         + _TOKENS.format(name="tokens")
         + f'print(f"MPJPE, {words}: {{back.mpjpe_mm:.1f}} mm")\n'
+        + _closer(state)
     )
+
+
+def _closer(state: State) -> str:
+    """What was looked at closely: a token replaced, or other words."""
+    chosen, code, text = state["selection"], state["code"], ""
+    if isinstance(chosen, Token) and code is not None and chosen.system == state.system:
+        text += (
+            f"\n# The token microscope: one token replaced, and the frames that the change moves.\n"
+            f"swap = engine.swap(tokens, scale={chosen.scale}, position={chosen.position}, code={code})\n"
+            'print(f"code {swap.before} became {swap.code}: frames {swap.span[0]} to {swap.span[1]} hold 80 % of the '
+            'change, at most {1000 * swap.difference.max():.0f} mm")\n'
+        )
+    if state["wrong"]:
+        text += (
+            f"\n# What the words do: the same motion with its caption, without words, with wrong ones.\n"
+            f"language = engine.language(tokens, {_literal(state['wrong'])})\n"
+            'print(f"other tokens: {language.bare_share:.0%} without words, {language.misled_share:.0%} with wrong '
+            'ones")\n'
+        )
+    return text
 
 
 def _generate(state: State) -> tuple[str, str]:
@@ -116,12 +137,47 @@ def _codebooks(state: State) -> tuple[str, str]:
     )
 
 
+def _edit(state: State) -> tuple[str, str]:
+    given = {"prompt": _literal(state["prompt"]), "seed": str(state["seed"]), "kind": _literal(state["kind"])}
+    edges = [state["from"], state["to"]]
+    known = None not in edges
+    span = f"({', '.join(str(round(float(edge) * LIMITS.fps)) for edge in edges)})" if known else "None"
+    made = str(state["motion"]).startswith(MADE)
+    if not made:
+        given |= {"system": _literal(state.system), "caption": _literal(state["caption"])}
+    given |= {"anchor": _literal(state["anchor"]), "measured": str(bool(state["measured"]))}
+    given |= {"guidance": _number(state["g"]), "cfg": _number(state["s"])}
+    arguments = "".join(f"    {name}={value},\n" for name, value in given.items())
+    return "A span of a motion drawn anew; the frames outside stay as they were.", (
+        (_remade(state) if made else _opened(state))
+        + f"edited = engine.edit(\n    {'made' if made else 'motion'},\n    {span},\n{arguments})\n"
+        + _TOKENS.format(name="edited")
+        + "assert (edited.motion.joints[edited.kept] == edited.source.joints[edited.kept]).all()\n"
+        + "for seam in edited.seams:\n"
+        + '    print(f"frame {seam.frame}: {seam.jolt_mm:.1f} mm; {seam.source_mm:.1f} mm before")\n'
+    )
+
+
+def _remade(state: State) -> str:
+    """The lines that open the engine and give `made`, the motion that a name of the address stands for."""
+    wish, changes = read_name(str(state["motion"]), str(state["caption"]))
+    own = {"prompt": wish.prompt or "", "free": wish.prompt is None, "seconds": wish.seconds, "g": wish.guidance,
+           "s": wish.cfg, "temperature": wish.temperature, "topk": wish.top_k, "topp": wish.top_p,
+           "system": (state.system,)}  # fmt: skip
+    return (
+        "from playground.engine import default_engine\n\nengine = default_engine()\n"
+        + _drawn(State("generate", own), wish.seed, 1)
+        + "".join(f"made = engine.regenerate({_changed(one)})\n" for one in changes)
+    )
+
+
 SCRIPTS: dict[str, Callable[[State], tuple[str, str]]] = {
     "tokenize": _tokenize,
     "embedding-map": _embedding_map,
     "codebooks": _codebooks,
     "generate": _generate,
     "guidance": _guidance,
+    "edit": _edit,
 }
 
 

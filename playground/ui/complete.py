@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from playground.systems import row_of
+from playground.ui.drawing import MADE
 from playground.ui.rooms.embedding import first_clip
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State, controls_of
@@ -24,7 +25,7 @@ def _is_there(services: Services, state: State) -> bool:
     wanted = str(state.values["motion"])
     if state.room == "embedding-map":
         return wanted in services.bundle(str(state.system)).ids
-    return wanted.startswith(OWN_FILE) or any(example.id == wanted for example in services.examples())
+    return wanted.startswith((OWN_FILE, MADE)) or any(example.id == wanted for example in services.examples())
 
 
 def _nothing(services: Services, state: State) -> Any:
@@ -45,7 +46,7 @@ def _motion(services: Services, state: State) -> str:
 def _caption(services: Services, state: State) -> str:
     """The motion's own caption; a file's is not known here."""
     wanted = str(state["motion"])
-    return "" if wanted.startswith(OWN_FILE) else services.example(wanted).caption
+    return "" if wanted.startswith((OWN_FILE, MADE)) else services.example(wanted).caption
 
 
 def _sampling(name: str) -> Callable[[Services, State], float]:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
@@ -17,6 +18,7 @@ from playground.results import Generation, GenerationStep
 from playground.systems import SamplingDefaults
 from playground.text.prompts import normalise
 from playground.ui.services import Services
+from playground.ui.state import State
 from playground.ui.uploads import checked_number
 
 WISHES = ("prompt", "free", "seconds", "seed", "g", "s", "temperature", "topk", "topp", "takes")  # keys of CONTROLS
@@ -214,21 +216,26 @@ def change(services: Services, result: Result, take: int, wanted: Change) -> Ite
         yield Drawing(wish, (step,), taken, old, Result(wish, (made,), changes, old))
 
 
-def made_name(result: Result, take: int) -> str:
-    """A motion of a result as the value of `motion` in an address: all that it takes to draw it again but its prompt.
+def wish_values(services: Services, state: State) -> tuple[Any, ...]:
+    """What the address of the room Generate asks for, in the order of `Wish.checked`."""
+    own = services.sampling()
+    usual = {"g": own.guidance, "s": own.cfg, "temperature": own.temperature, "topk": own.top_k, "topp": own.top_p}
+    return tuple(state.values.get(key, usual.get(key, state[key])) for key in WISHES)
+
+
+def made_name(wish: Wish, seed: int, changes: Sequence[Change] = ()) -> str:
+    """A generated motion as the value of `motion` in an address: all that it takes to draw it again but its prompt.
 
     "" where that is more than an address has room for.
     """
-    wish = result.wish
     numbers = (wish.seconds, wish.guidance, wish.cfg, wish.temperature, wish.top_k, wish.top_p)
-    seed = wish.seed if result.changes else result.takes[take].seed
     parts = [str(seed), *(repr(round(float(number), 3)).removesuffix(".0") for number in numbers)]
-    name = MADE + "_".join([*parts, *map(str, result.changes)])
+    name = MADE + "_".join([*parts, *map(str, changes)])
     return name if len(name) <= MAX_NAME else ""
 
 
-def made_again(services: Services, name: str, prompt: str) -> Generation:
-    """The motion that `made_name` names. PlaygroundError for any other name."""
+def read_name(name: str, prompt: str) -> tuple[Wish, tuple[Change, ...]]:
+    """The wish and the changes that `made_name` names. PlaygroundError for any other name."""
     parts = name.removeprefix(MADE).split("_")
     try:
         seed, numbers = int(parts[0]), [float(part) for part in parts[1:7]]
@@ -237,8 +244,13 @@ def made_again(services: Services, name: str, prompt: str) -> Generation:
             raise ValueError(name)
     except ValueError:
         raise PlaygroundError("this link names no motion that can be drawn again; choose another one") from None
-    seconds, *sampling = numbers
-    result = last_of(draw(services, Wish.checked(prompt, not prompt, seconds, seed, *sampling)))
+    return Wish.checked(prompt, not prompt, numbers[0], seed, *numbers[1:]), changes
+
+
+def made_again(services: Services, name: str, prompt: str) -> Generation:
+    """The motion that `made_name` names. PlaygroundError for any other name."""
+    wish, changes = read_name(name, prompt)
+    result = last_of(draw(services, wish))
     for wanted in changes:
         result = last_of(change(services, result, 0, wanted))
     return result.takes[0]

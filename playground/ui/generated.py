@@ -85,7 +85,8 @@ def earlier(visit: Visit) -> str:
 def onward(result: Result, take: int) -> str:
     """Where this motion can be taken next: links that the page follows without leaving."""
     wish, made = result.wish, result.takes[take]
-    links, name = [], made_name(result, take)
+    seed = wish.seed if result.changes else made.seed
+    links, name = [], made_name(wish, seed, result.changes)
     if name:
         links.append(("Edit this motion", State("edit", {"motion": name, "caption": wish.prompt or ""})))
     if wish.prompt:

@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 
 from playground.engine import default_engine
 from playground.errors import PlaygroundError
-from playground.ui.rooms import codebooks, embedding, generate, guidance, tokenize
+from playground.ui.rooms import codebooks, edit, embedding, generate, guidance, tokenize
 from playground.ui.services import Services
 from playground.ui.view import View
 
 OPENINGS: dict[str, Callable[[Services], View]] = {
-    room.NAME: room.opening_view for room in (tokenize, embedding, codebooks, generate, guidance)
+    room.NAME: room.opening_view for room in (tokenize, embedding, codebooks, generate, guidance, edit)
 }
 
 

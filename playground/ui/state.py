@@ -19,7 +19,7 @@ from urllib.parse import parse_qsl, urlencode
 from playground.limits import LIMITS
 from playground.systems import SYSTEMS
 
-ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "learn")
+ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "learn")
 PARTS = {name: f'[data-part="{name}"]' for name in ("link", "python", "export", "tour")} | {
     "learn": "#room-learn-button"
 }  # parts of the page, beside controls, that `hide` may name -> how the page finds them
@@ -120,6 +120,21 @@ CONTROLS: tuple[Control, ...] = (
     Control("motion", "guidance", "name", None, "Motion", element="guidance-example"),
     Control("caption", "guidance", "text", None, "Caption", 0, _PROMPT, element="guidance-caption"),
     Control("g", "guidance", "number", 2.0, "Guidance g", 0, _G, element="guidance-g"),
+    *_of_stage("edit", "edit"),
+    Control("motion", "edit", "name", None, "Motion", element="edit-example"),
+    Control("caption", "edit", "text", None, "Caption of the motion", 0, _PROMPT),
+    Control("kind", "edit", "choice", "inpaint", "What is drawn anew", element="edit-kind",
+            choices=("inpaint", "outpaint", "prefix", "suffix", "inbetween")),
+    Control("from", "edit", "number", None, "From, s", 0, LIMITS.max_seconds, element="edit-from"),
+    Control("to", "edit", "number", None, "To, s", 0, LIMITS.max_seconds, element="edit-to"),
+    Control("prompt", "edit", "text", "a person is waving with both hands", "What should happen there", 1, _PROMPT,
+            element="edit-prompt"),
+    Control("seed", "edit", "whole", 0, "Seed", 0, _SEED, element="edit-seed"),
+    Control("g", "edit", "number", None, "Guidance g, decoder", 0, _G, element="edit-g"),
+    Control("s", "edit", "number", None, "Guidance s, generator", 0, _G, element="edit-s"),
+    Control("anchor", "edit", "choice", "place", "Kept frames that follow", element="edit-anchor",
+            choices=("place", "body")),
+    Control("measured", "edit", "flag", False, "Tokens by measured frames", element="edit-measured"),
     Control("hide", "", "names", (), "Hidden controls"),
 )  # fmt: skip
 

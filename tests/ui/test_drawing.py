@@ -114,7 +114,7 @@ def test_changes_end_somewhere(services: Services) -> None:
 def test_a_made_motion_can_be_named_and_drawn_again(services: Services) -> None:
     result = last_of(draw(services, wish(3)))
     for made, take in ((result, 2), (last_of(change(services, result, 1, Change(4, 1, 5))), 0)):
-        name = made_name(made, take)
+        name = made_name(made.wish, made.wish.seed if made.changes else made.takes[take].seed, made.changes)
         assert parse(f"?room=tokenize&motion={name}")["motion"] == name
         again = made_again(services, name, "a person sits")
         assert all(np.array_equal(a.ids, b.ids) for a, b in zip(again.levels, made.takes[take].levels, strict=True))

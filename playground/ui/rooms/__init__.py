@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from playground.ui.rooms import codebooks, embedding, generate, guidance, learn, tokenize
+from playground.ui.rooms import codebooks, edit, embedding, generate, guidance, learn, tokenize
 from playground.ui.services import Services
 
 ROOMS: dict[str, Callable[[Services], None]] = {
@@ -11,5 +11,6 @@ ROOMS: dict[str, Callable[[Services], None]] = {
     "Codebooks": codebooks.room,
     "Generate": generate.room,
     "Guidance": guidance.room,
+    "Edit": edit.room,
     "Learn": learn.room,
 }

@@ -21,6 +21,7 @@ from playground.ui.drawing import (
     draw,
     last_of,
     read_changes,
+    wish_values,
     write_changes,
 )
 from playground.ui.errors import Noted, attach, message_place
@@ -82,10 +83,9 @@ class Handlers:
 
     def fill(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
         """The controls as a link asks for them, in the order of `Wish.checked`."""
-        state, own = asked(event), self.services.sampling()
-        usual = {"g": own.guidance, "s": own.cfg, "temperature": own.temperature, "topk": own.top_k, "topp": own.top_p}
+        state = asked(event)
         visit.wanted, visit.take = read_changes(state["changes"]), int(state["take"])
-        return tuple(state.values.get(key, usual.get(key, state[key])) for key in WISHES)
+        return wish_values(self.services, state)
 
     def begin(self, visit: Visit) -> tuple[Any, ...]:
         """At the click, before any waiting: "Stop" becomes possible and "Generate" does not."""
