@@ -93,6 +93,14 @@ class Services:
                 mark.update(json.dumps([system.name, heads], sort_keys=True).encode())
         return mark.hexdigest()[:16]
 
+    def shipped(self) -> list["SystemInfo"]:
+        """The systems whose checkpoint is here."""
+        return [system for system in self.engine().systems() if system.checkpoint == "shipped"]
+
+    def preset(self, room: str, example: str) -> View | None:
+        """The stored result of a room for an example, or None."""
+        return read_view(self.opening_path(f"{room}-{example}"), self.fingerprint())
+
     def first_view(self, name: str, compute: Callable[["Services"], View]) -> View:
         """The stored first result of a room, or one computed now; an empty stage with one sentence without either."""
         found = read_view(self.opening_path(name), self.fingerprint())
@@ -118,7 +126,7 @@ class Services:
 
     def default_system(self) -> "SystemInfo":
         """The first shipped system that can generate, or else the first shipped one; PlaygroundError if none is."""
-        shipped = [system for system in self.engine().systems() if system.checkpoint == "shipped"]
+        shipped = self.shipped()
         if not shipped:
             raise PlaygroundError("no trained system is shipped with this copy; train one with: make train")
         return next((system for system in shipped if system.generator), shipped[0])

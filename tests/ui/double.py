@@ -26,6 +26,7 @@ from playground.systems import SystemInfo
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 from tests.ui.double_drawing import Drawing
+from tests.ui.double_studies import Studies, shaken
 
 SIZES = (1, 2, 3, 4, 6, 8, 12, 18, 26, 36)
 CODES = (128, 128, 192, 192, 256, 256, 320, 320, 384, 384)
@@ -73,7 +74,7 @@ def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
     return index.astype(np.int32), np.zeros(8, np.float32), np.eye(3, 8, dtype=np.float32), scores, places
 
 
-class FakeEngine(Drawing):
+class FakeEngine(Drawing, Studies):
     """What the rooms use of the engine. `pause` is called before every scale of a generation."""
 
     def __init__(self, pause: Callable[[], None] = lambda: None) -> None:
@@ -126,7 +127,7 @@ class FakeEngine(Drawing):
         self.calls.append(f"reconstruct {scales}")
         used = scales or len(SIZES)
         size = 0.2 + 0.2 * (zlib.crc32(tokenized.motion.joints.tobytes()) % 100) / 100
-        motion = _shaken(tokenized.motion, size * 0.75**used)
+        motion = shaken(tokenized.motion, size * 0.75**used)
         error = mpjpe(tokenized.motion.joints, motion.joints)
         return Decoded(motion, _features(motion), error, guidance, used, 0.04)
 
@@ -151,26 +152,18 @@ class FakeEngine(Drawing):
         for n in range(1, len(levels) + 1):
             self.pause()
             entropy.append(rng.uniform(0, 5, SIZES[n - 1]).astype(np.float32))
-            motion = _shaken(clean, 0.4 * 0.7**n)
+            motion = shaken(clean, 0.4 * 0.7**n)
             yield GenerationStep(n, levels[:n], tuple(entropy), motion, _features(motion))
 
     def guidance_pair(self, result: Tokenized, caption: str | None = None) -> GuidancePair:
         self.calls.append("guidance_pair")
-        worded, wordless = _features(result.motion), _features(_shaken(result.motion, 0.02))
+        worded, wordless = _features(result.motion), _features(shaken(result.motion, 0.02))
         mean, std = worded.mean(axis=0), worded.std(axis=0) + np.float32(1e-2)
         return GuidancePair((worded - mean) / std, (wordless - mean) / std, mean, std)
 
 
 def _same(motion: Motion) -> Motion:
     return motion
-
-
-def _shaken(motion: Motion, size: float) -> Motion:
-    """The motion with every joint off by a smooth wobble of `size` metres."""
-    rng = np.random.default_rng(7)
-    phase = rng.uniform(0, 2 * np.pi, (22, 3))
-    time = np.arange(motion.frames)[:, None, None] / 20
-    return replace(motion, joints=(motion.joints + size * 0.3 * np.sin(2 * time + phase)).astype(np.float32))
 
 
 def _features(motion: Motion) -> NDArray[np.float32]:

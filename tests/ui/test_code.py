@@ -66,6 +66,16 @@ def test_tokenize(services: Services, tmp_path: Path, monkeypatch: pytest.Monkey
     )
 
 
+def test_closer_looks(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    query = "?room=tokenize&motion=synthetic-kick&selection=lgtok-lite.4.1&code=7&wrong=a+person+%22sits%22"
+    state, left = run(services, query, tmp_path, monkeypatch)
+    engine = default_engine()
+    tokens = engine.tokenize(services.example_motion(state["motion"]), state["caption"], str(state.system))
+    swap, language = engine.swap(tokens, 4, 1, 7), engine.language(tokens, 'a person "sits"')
+    assert ids(left["swap"].levels) == ids(swap.levels) and left["swap"].span == swap.span
+    assert left["language"].bare_share == language.bare_share and left["language"].wrong == language.wrong
+
+
 def test_a_file_of_ones_own(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     np.savez(tmp_path / "my walk.npz", joints=drifting(400), fps=20.0)
     _, left = run(services, "?room=tokenize&motion=file%3Amy+walk.npz&start=3.5&caption=x", tmp_path, monkeypatch)

@@ -7,6 +7,8 @@ import pytest
 
 from playground.analysis.bundle import Bundle
 from playground.errors import PlaygroundError
+from playground.findings import ScaleSet
+from playground.ui import tokenizing
 from playground.ui.rooms import embedding, generate, guidance, tokenize
 from playground.ui.services import Services
 from playground.ui.uploads import Source
@@ -28,22 +30,25 @@ def millimetres(text: str) -> float:
 
 
 def test_more_scales_bring_the_motion_closer(services: Services, engine: FakeEngine) -> None:
-    held, view = tokenize.run(services, tokenize.Session(source=Source(motions()[0], "one")))
-    errors = [millimetres(tokenize.run(services, held, used)[1].facts[0].value) for used in (1, 5, 10)]
+    held, view = tokenizing.run(services, tokenizing.Session(source=Source(motions()[0], "one")))
+    sets = [ScaleSet("upto", used) for used in (1, 5, 10)]
+    errors = [millimetres(tokenizing.run(services, held, used)[1].facts[0].value) for used in sets]
     assert errors[0] > errors[1] > errors[2] == millimetres(view.facts[0].value)
-    assert engine.calls.count("tokenize") == 1  # the slider decodes again, it does not tokenize again
+    assert engine.calls.count("tokenize") == 1  # the slider looks decodes up, it does not tokenize again
+    assert [call for call in engine.calls if call.startswith("scale_study")] == ["scale_study upto"]
 
 
-def test_tokens_are_counted_up_to_the_scale_in_use(services: Services) -> None:
-    held, _ = tokenize.run(services, tokenize.Session(source=Source(motions()[0], "one")))
-    _, view = tokenize.run(services, held, 3)
-    assert view.facts[1].value == str(sum(SIZES[:3]))
-    assert view.controls["scales"] == 3 and view.controls["count"] == len(SIZES)
+@pytest.mark.parametrize(("used", "tokens"), [("upto:3", SIZES[:3]), ("only:3", SIZES[2:3]), ("without:1", SIZES[1:])])
+def test_tokens_are_counted_of_the_scales_in_use(services: Services, used: str, tokens: tuple[int, ...]) -> None:
+    held, _ = tokenizing.run(services, tokenizing.Session(source=Source(motions()[0], "one")))
+    _, view = tokenizing.run(services, held, ScaleSet.of(used, len(SIZES)))
+    assert view.facts[1].value == str(sum(tokens))
+    assert f"{view.controls['kind']}:{view.controls['scales']}" == used and view.controls["count"] == len(SIZES)
 
 
 def test_a_forgotten_session_starts_at_the_opening_again(services: Services) -> None:
     opening = tokenize.opening_view(services)
-    held = tokenize.open_session(services, None, opening)
+    held = tokenizing.open_session(services, None, opening)
     assert held.source is not None and held.caption == opening.controls["caption"]
 
 
