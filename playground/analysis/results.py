@@ -87,7 +87,12 @@ class Result:
 
     def estimate(self, key: str, **facts: Any) -> Estimate:
         """A number of the first row with these values."""
-        return Estimate.of(self.row(**facts).get(key))
+        return self.value(self.row(**facts).get(key))
+
+    def value(self, entry: object) -> Estimate:
+        """A number of this result. A single repeat has no interval: its ci95 of 0 would say nothing (F2)."""
+        found = Estimate.of(entry)
+        return Estimate(found.mean, None, found.why) if self.provenance.get("repeats") == 1 else found
 
     @property
     def line(self) -> str:

@@ -16,7 +16,7 @@ TOP = "r_precision_top3_pool32"
 
 def best_guidance(result: Result, key: str = "fid", lower: bool = True) -> tuple[float, Estimate] | None:
     """The g of a sweep with the best mean of a metric, and that number; None where nothing is measured."""
-    rows = [(float(row["g"]), Estimate.of(row.get(key))) for row in result.rows]
+    rows = [(float(row["g"]), result.value(row.get(key))) for row in result.rows]
     rows = [(g, value) for g, value in rows if value.mean is not None]
     if not rows:
         return None
@@ -31,7 +31,7 @@ def sweep_plot(results: Results, *, title: str = "Guidance sweep", height: int =
     for column, (key, words) in enumerate(panels, 1):
         for system, result in found.items():
             _curve(figure, column, result, key, SYSTEMS[system].title)
-        real = next((Estimate.of(result.more["real"].get(key)) for result in found.values()), Estimate(None))
+        real = next((result.value(result.more["real"].get(key)) for result in found.values()), Estimate(None))
         if real.mean is not None:
             annotation = {"text": "real motion", "font": {"size": 11}}
             figure.add_hline(y=real.mean, line=reference_line(), annotation=annotation, row=1, col=column)
@@ -43,7 +43,7 @@ def sweep_plot(results: Results, *, title: str = "Guidance sweep", height: int =
 
 
 def _curve(figure: go.Figure, column: int, result: Result, key: str, label: str) -> None:
-    rows = [(float(row["g"]), Estimate.of(row.get(key))) for row in result.rows]
+    rows = [(float(row["g"]), result.value(row.get(key))) for row in result.rows]
     rows = [(g, value) for g, value in rows if value.mean is not None]
     color = system_color(result.system)
     figure.add_trace(
@@ -132,7 +132,7 @@ def table8(results: Results) -> Table:
             continue
         for row in result.rows:
             words = "with the caption" if row["drawn"] == "prompted" else "free-form"
-            values = [number(Estimate.of(row.get(key))) for key in ("fid", TOP, "diversity")]
+            values = [number(result.value(row.get(key))) for key in ("fid", TOP, "diversity")]
             rows.append((SYSTEMS[system].title, words, row["read"], *values))
     heads = ("system", "tokens drawn", "tokens read with", "FID", "Top 3", "Diversity")
     return Table(heads, tuple(rows), "Ours: free-form generation", measured_on(results))

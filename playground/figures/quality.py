@@ -170,6 +170,7 @@ def _facts(metadata: Mapping[str, str]) -> dict[str, Any]:
 def methods_plot(results: Results) -> go.Figure:
     """Fig 2: FID against Top 1 of generated motions, the paper's HumanML3D numbers and ours, each on their own axes."""
     figure = make_subplots(1, 2, horizontal_spacing=0.13, subplot_titles=("paper, HumanML3D", "ours"))
+    figure.update_annotations(font={"size": 12}, yshift=2)
     quoted = cited("table2_humanml3d")
     for row in quoted.rows:
         values = dict(zip(quoted.columns, row, strict=True))
@@ -184,8 +185,17 @@ def methods_plot(results: Results) -> go.Figure:
     for column, value in enumerate((Estimate.of(quoted.value("real motion", "Top 1")), ours), 1):
         if value.mean is not None:
             annotation = {"text": "real motion", "font": {"size": 11}}
-            figure.add_hline(y=value.mean, line=reference_line(), annotation=annotation, col=column, row=1)
-        figure.update_xaxes(title="FID of generated motions, lower is better", rangemode="tozero", row=1, col=column)
+            figure.add_hline(
+                y=value.mean,
+                line=reference_line(),
+                annotation=annotation,
+                annotation_position="top left",
+                col=column,
+                row=1,
+            )
+        figure.update_xaxes(title="FID of generated motions, lower is better", row=1, col=column)
+    for column in (1, 2):
+        _room(figure, column)
     figure.update_yaxes(title="Top 1, higher is better", col=1)
     return finish(figure, title="Quality of generated motions", caption=_caption(results), heads=1)
 
@@ -193,6 +203,7 @@ def methods_plot(results: Results) -> go.Figure:
 def tokens_plot(results: Results) -> go.Figure:
     """Table 1 as lines: FID of rebuilt and of generated motions against the number of tokens."""
     figure = make_subplots(1, 2, horizontal_spacing=0.13, subplot_titles=("paper, Motion-X, without text", "ours"))
+    figure.update_annotations(font={"size": 12}, yshift=2)
     quoted = cited("table1")
     counts = [row[quoted.columns.index("tokens")] for row in quoted.rows]
     for key, label, dash in (("rFID", "rebuilt", "solid"), ("gFID", "generated", "dash")):
@@ -208,6 +219,18 @@ def tokens_plot(results: Results) -> go.Figure:
     figure.update_xaxes(title="tokens a motion", range=[80, 260])
     figure.update_yaxes(title="FID", rangemode="tozero")
     return finish(figure, title="Tokens against quality", caption=_caption(dict(ordered)), heads=1)
+
+
+def _room(figure: go.Figure, column: int) -> None:
+    """Ranges that leave room for the names beside and above the points; FID begins at 0."""
+    axis = f"x{column if column > 1 else ''}"
+    points = [(trace.x[0], trace.y[0]) for trace in figure.data if trace.xaxis == axis]
+    lines = [shape.y0 for shape in figure.layout.shapes if str(shape.xref).startswith(f"{axis} ")]
+    if points:
+        heights = [y for _, y in points] + lines
+        span = max(max(heights) - min(heights), 0.01)
+        figure.update_xaxes(range=[0, 1.2 * max(x for x, _ in points)], row=1, col=column)
+        figure.update_yaxes(range=[min(heights) - 0.1 * span, max(heights) + 0.2 * span], row=1, col=column)
 
 
 def _line(figure: go.Figure, column: int, x: Sequence[Any], values: Sequence[Estimate], label: str, dash: str) -> None:

@@ -60,4 +60,5 @@ def times_plot(results: Results) -> go.Figure:
     caption = "Pale: the paper's, on one RTX 4090. " + "; ".join(
         machine_line(result) for result in results.values() if result is not None
     )
-    return finish(figure, title="Inference time", caption=caption, height=120 + 26 * len(bars), left=170, right=60)
+    return finish(figure, title="Inference time", caption=caption, height=130 + 26 * len(bars), left=170, right=60,
+                  tick_lines=2)  # fmt: skip

@@ -69,6 +69,8 @@ def test_rows_numbers_and_the_caption() -> None:
     assert RESULT.estimate("fid", of="real") == Estimate(0.5, 0.1)
     assert RESULT.estimate("fid", of="generated") == Estimate(None, None, "too few")
     assert RESULT.estimate("g", of="generated") == Estimate(2.0)
+    alone = Result("evaluation", "", RESULT.provenance | {"repeats": 1}, RESULT.rows)
+    assert alone.estimate("fid", of="real") == Estimate(0.5) and alone.line.count("1 repeat,") == 1
     assert RESULT.estimate("nothing", of="real").mean is None and RESULT.row(of="nobody") == {}
     assert RESULT.line == f"{SYSTEM}, checkpoint 01234567, 5 test clips of tiny, 2 repeats, seed 0"
 
