@@ -57,7 +57,7 @@ def _ours(name: str, title: str, *, scalewise: bool = True) -> SystemRow:
         "lgtok",
         "LG-Tok transformer" if scalewise else "LG-Tok transformer, plain residual levels",
         "scale-wise autoregression" if scalewise else None,
-        sampling=SamplingDefaults(guidance=0.0, cfg=3.0),  # chosen on lgtok-lite by the plain prompts that it obeys
+        sampling=SamplingDefaults(guidance=0.0, cfg=4.0),  # chosen on lgtok-lite by the plain prompts that it obeys
     )
 
 
