@@ -12,9 +12,14 @@ from collections.abc import Callable
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
+from playground.ui.comparing import MOTION, VARIATIONS, Setting
 from playground.ui.drawing import MADE, Change, Wish, read_changes, read_name
 from playground.ui.state import OWN_FILE, Scales, State, Token, controls_of
 
+_SLIDES = """
+for name, result in results.items():
+    print(f"{name}: feet slide {foot_sliding(result.motion.joints):.0f} mm/s")
+"""
 _MADE = "Made by the Motion Token Playground; run it with the Python that the playground is installed in."
 _TOKENS = """
 for number, level in enumerate({name}.levels, 1):
@@ -158,6 +163,39 @@ def _edit(state: State) -> tuple[str, str]:
     )
 
 
+def _compare(state: State) -> tuple[str, str]:
+    """`settings` of the state are those of comparing.settings_of, which complete() has filled in."""
+    rebuilt = VARIATIONS[state["vary"]].of == MOTION
+    settings: list[Setting] = list(state.values["settings"])
+    if not rebuilt:
+        rows = "".join(
+            f"    {_literal(one.name)}: dict(system={_literal(one.system)}, seed={one.seed}, cfg={_number(one.cfg)}, "
+            f"temperature={_number(one.temperature)}, guidance={_number(one.guidance)}),\n"
+            for one in settings
+        )
+        made = f"engine.generate({_literal(settings[0].text)}, {_number(settings[0].seconds)}, **setting)"
+        return "One prompt, several settings.", (
+            "from playground.engine import default_engine\nfrom playground.motion.measures import foot_sliding\n\n"
+            f"engine = default_engine()\nsettings = {{\n{rows}}}\nresults = {{}}\n"
+            f"for name, setting in settings.items():\n    results[name] = {made}\n" + _SLIDES
+        )
+    rows = "".join(
+        f"    {_literal(one.name)}: ({_literal(one.text)}, {_literal(one.system)}, {_number(one.guidance)}, "
+        f"{one.scales}),\n"
+        for one in settings
+    )
+    return "One motion, several settings.", (
+        _opened(state)
+        + "from playground.motion.measures import foot_sliding\n\n"
+        + f"settings = {{  # caption, system, guidance, scales\n{rows}}}\ntokens, results = {{}}, {{}}\n"
+        + "for name, (caption, system, guidance, scales) in settings.items():\n"
+        + "    tokens[name] = engine.tokenize(motion, caption, system=system)\n"
+        + "    results[name] = engine.reconstruct(tokens[name], guidance=guidance, scales=scales)\n"
+        + '    print(f"{name}: MPJPE {results[name].mpjpe_mm:.1f} mm")\n'
+        + _SLIDES
+    )
+
+
 def _remade(state: State) -> str:
     """The lines that open the engine and give `made`, the motion that a name of the address stands for."""
     wish, changes = read_name(str(state["motion"]), str(state["caption"]))
@@ -178,6 +216,7 @@ SCRIPTS: dict[str, Callable[[State], tuple[str, str]]] = {
     "generate": _generate,
     "guidance": _guidance,
     "edit": _edit,
+    "compare": _compare,
 }
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from playground.systems import row_of
+from playground.ui.comparing import MOTION, VARIATIONS, chosen, settings_of
 from playground.ui.drawing import MADE
 from playground.ui.rooms.embedding import first_clip
 from playground.ui.services import Services
@@ -17,7 +18,17 @@ def complete(services: Services, state: State) -> State:
         if filled.values.get(row.key) is None or (row.key == "motion" and not _is_there(services, filled)):
             value = row.default if row.default is not None else FILLS.get(row.key, _nothing)(services, filled)
             filled = filled.with_values(**{row.key: value})
-    return filled
+    return _with_settings(services, filled) if state.room == "compare" else filled
+
+
+def _with_settings(services: Services, state: State) -> State:
+    """What is compared, one by one, as `settings`: the address names only what differs."""
+    vary = str(state["vary"])
+    picked = [name for _, name in chosen(services, vary, str(state.values.get("values") or "").split("_"))]
+    of_motion = VARIATIONS[vary].of == MOTION
+    text = services.example(str(state["motion"])).caption if of_motion else str(state["prompt"])
+    picked = picked[: VARIATIONS[vary].most]
+    return state.with_values(settings=settings_of(services, vary, picked, text, state["seconds"], state["seed"]))
 
 
 def _is_there(services: Services, state: State) -> bool:

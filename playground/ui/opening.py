@@ -1,4 +1,4 @@
-"""The first result of every room, stored: `python -m playground.ui.opening [--room NAME ...]` after each training.
+"""First results of rooms and presets, stored: `python -m playground.ui.opening [--room NAME ...]` after each training.
 
 The page reads them when it is built, so that it opens with finished examples and loads no model for that. They carry
 the fingerprint of the checkpoints they came from and are ignored once these have changed.
@@ -10,13 +10,16 @@ from collections.abc import Callable, Sequence
 
 from playground.engine import default_engine
 from playground.errors import PlaygroundError
-from playground.ui.rooms import codebooks, edit, embedding, generate, guidance, tokenize
+from playground.ui.rooms import codebooks, compare, edit, embedding, generate, guidance, tokenize
 from playground.ui.services import Services
 from playground.ui.view import View
 
 OPENINGS: dict[str, Callable[[Services], View]] = {
-    room.NAME: room.opening_view for room in (tokenize, embedding, codebooks, generate, guidance, edit)
+    room.NAME: room.opening_view for room in (tokenize, embedding, codebooks, generate, guidance, edit, compare)
 }
+
+
+PRESETS: dict[str, Callable[[Services, str], View]] = {tokenize.NAME: tokenize.preset_view}  # one an example
 
 
 def write_openings(services: Services, names: Sequence[str] = ()) -> list[str]:
@@ -26,6 +29,9 @@ def write_openings(services: Services, names: Sequence[str] = ()) -> list[str]:
         made = OPENINGS[name](services)
         made = OPENINGS[name](services) if made.kind == "live" else made  # the first run pays for loading the models
         made.stored(services.fingerprint()).write(services.opening_path(name))
+        for example in services.examples() if name in PRESETS else ():
+            preset = PRESETS[name](services, example.id)
+            preset.stored(services.fingerprint()).write(services.opening_path(f"{name}-{example.id}"))
     return chosen
 
 

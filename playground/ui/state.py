@@ -18,48 +18,17 @@ from urllib.parse import parse_qsl, urlencode
 
 from playground.limits import LIMITS
 from playground.systems import SYSTEMS
+from playground.ui.places import Scales as Scales
+from playground.ui.places import Span as Span
+from playground.ui.places import Token as Token
 
-ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "learn")
+ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "compare", "learn")
 PARTS = {name: f'[data-part="{name}"]' for name in ("link", "python", "export", "tour")} | {
     "learn": "#room-learn-button"
 }  # parts of the page, beside controls, that `hide` may name -> how the page finds them
 UPLOADED = "uploaded"  # what a menu of motions calls the visitor's own file
 OWN_FILE = "file:"  # how the value of `motion` begins that stands for a file of the visitor's own
 Value = Any  # str | float | int | bool | tuple[str, ...] | Scales | Token | Span | None
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Which scales a decode uses: "upto" 1..n, "only" n, "without" n; n counts from 1. In an address 8, only-8."""
-
-    kind: str
-    n: int
-
-    def __str__(self) -> str:
-        return str(self.n) if self.kind == "upto" else f"{self.kind}-{self.n}"
-
-
-@dataclass(frozen=True)
-class Token:
-    """A selected token; scale from 1, position from 0. In an address lgtok-lite.3.5."""
-
-    system: str
-    scale: int
-    position: int
-
-    def __str__(self) -> str:
-        return f"{self.system}.{self.scale}.{self.position}"
-
-
-@dataclass(frozen=True)
-class Span:
-    """Selected frames, stop not included. In an address 12-40."""
-
-    start: int
-    stop: int
-
-    def __str__(self) -> str:
-        return f"{self.start}-{self.stop}"
 
 
 @dataclass(frozen=True)
@@ -85,6 +54,9 @@ def _of_stage(room: str, prefix: str) -> tuple[Control, ...]:
     )
 
 
+EDITS = ("inpaint", "outpaint", "prefix", "suffix", "inbetween")
+DIFFERENCES = ("system", "scales", "caption", "g", "maker", "seed", "s", "temperature")  # what Compare may vary
+_WAVES = "a person is waving with both hands"
 _PROMPT, _SEED, _G = LIMITS.max_prompt_chars, LIMITS.max_seed, LIMITS.max_guidance
 CONTROLS: tuple[Control, ...] = (
     Control("room", "", "choice", "tokenize", "Room", choices=ROOMS),
@@ -103,6 +75,8 @@ CONTROLS: tuple[Control, ...] = (
     Control("system", "codebooks", "systems", None, "System", element="codebooks-system"),
     Control("order", "codebooks", "choice", "sorted", "Order of the codes", choices=("sorted", "index"),
             element="codebooks-order"),
+    Control("k", "codebooks", "whole", 10, "Top k", 1, 256, element="codebooks-k"),
+    Control("code", "codebooks", "name", None, "Code"),
     *_of_stage("generate", "generate"),
     Control("prompt", "generate", "text", "a person steadily walks forward", "Prompt", 1, _PROMPT,
             element="generate-prompt"),
@@ -126,18 +100,23 @@ CONTROLS: tuple[Control, ...] = (
     *_of_stage("edit", "edit"),
     Control("motion", "edit", "name", None, "Motion", element="edit-example"),
     Control("caption", "edit", "text", None, "Caption of the motion", 0, _PROMPT),
-    Control("kind", "edit", "choice", "inpaint", "What is drawn anew", element="edit-kind",
-            choices=("inpaint", "outpaint", "prefix", "suffix", "inbetween")),
+    Control("kind", "edit", "choice", "inpaint", "What is drawn anew", element="edit-kind", choices=EDITS),
     Control("from", "edit", "number", None, "From, s", 0, LIMITS.max_seconds, element="edit-from"),
     Control("to", "edit", "number", None, "To, s", 0, LIMITS.max_seconds, element="edit-to"),
-    Control("prompt", "edit", "text", "a person is waving with both hands", "What should happen there", 1, _PROMPT,
-            element="edit-prompt"),
+    Control("prompt", "edit", "text", _WAVES, "What should happen there", 1, _PROMPT, element="edit-prompt"),
     Control("seed", "edit", "whole", 0, "Seed", 0, _SEED, element="edit-seed"),
     Control("g", "edit", "number", None, "Guidance g, decoder", 0, _G, element="edit-g"),
     Control("s", "edit", "number", None, "Guidance s, generator", 0, _G, element="edit-s"),
-    Control("anchor", "edit", "choice", "place", "Kept frames that follow", element="edit-anchor",
-            choices=("place", "body")),
+    Control("anchor", "edit", "choice", "place", "Kept frames that follow", 0, 0, ("place", "body"), "edit-anchor"),
     Control("measured", "edit", "flag", False, "Tokens by measured frames", element="edit-measured"),
+    *_of_stage("compare", "compare"),
+    Control("vary", "compare", "choice", "scales", "What differs", element="compare-vary", choices=DIFFERENCES),
+    Control("values", "compare", "name", None, "Side by side", element="compare-values"),
+    Control("motion", "compare", "name", None, "Motion", element="compare-example"),
+    Control("prompt", "compare", "text", _WAVES, "Prompt", 1, _PROMPT, element="compare-prompt"),
+    Control("seconds", "compare", "number", 4.0, "Seconds", 1, LIMITS.max_seconds, element="compare-seconds"),
+    Control("seed", "compare", "whole", 0, "Seed", 0, _SEED, element="compare-seed"),
+    Control("take", "compare", "whole", 0, "Tokens of", 0, LIMITS.max_figures - 1, element="compare-take"),
     Control("hide", "", "names", (), "Hidden controls"),
 )  # fmt: skip
 

@@ -12,10 +12,11 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tests.browser.server import CHROMIUM_FLAGS, ROOT, chromium, serving
 
-ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance")
+ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit", "Compare")
 SIZES = {"desktop": {"width": 1280, "height": 720}, "phone": {"width": 390, "height": 844}}
 STANDING = 1_500  # milliseconds for charts to be drawn and figures to take a step
-LATER = "() => ['tokenize', 'embedding', 'generate', 'guidance'].forEach((n) => MotionStage.get(n)?.seek(24))"
+STAGES = ["tokenize", "embedding", "generate", "guidance", "edit", "compare"]
+LATER = f"() => {STAGES}.forEach((name) => MotionStage.get(name)?.seek(24))"
 
 
 def photograph(browser: Browser, address: str, folder: Path) -> list[Path]:

@@ -17,7 +17,7 @@ from tests.browser.server import ROOT, serving
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
 ASSETS = ROOT / "assets"
-ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance")
+ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "compare")
 
 
 def shipped(*parts: Path) -> None:

@@ -65,7 +65,7 @@ def test_a_span_is_drawn_and_repainted(seen: Visit, visit: Go) -> None:
 
 def test_another_kind_and_the_last_generation(seen: Visit) -> None:
     page = seen.page
-    page.get_by_role("radio", name="Prefix").check(force=True)
+    page.locator("#edit-kind label", has_text="Prefix").click()
     expect(page.locator("#edit-about")).to_contain_text("continuation")
     page.locator("#edit-last").click()
     page.wait_for_function(SHOWN, arg=1)

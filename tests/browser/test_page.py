@@ -10,13 +10,16 @@ from tests.browser.conftest import DESKTOP, PHONE, Visit
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
-ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance")
-STAGES = {"Tokenize": "tokenize", "Embedding map": "embedding", "Generate": "generate", "Guidance": "guidance"}
+ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit", "Compare")
+STAGES = {room: room.lower() for room in ("Tokenize", "Generate", "Guidance", "Edit", "Compare")}
+STAGES["Embedding map"] = "embedding"
 CONTROLS = {
     "Tokenize": "#tokenize-scales input[type=range]",
     "Embedding map": "#embedding-map .plotly",
     "Generate": "#generate-go",
     "Guidance": "#guidance-g input[type=range]",
+    "Edit": "#edit-go",
+    "Compare": "#compare-go",
 }
 
 

@@ -9,6 +9,7 @@ import pytest
 from playground.engine import default_engine
 from playground.systems import checkpoint_path
 from playground.ui.bar import script
+from playground.ui.comparing import run as compare_all
 from playground.ui.drawing import Change, Wish, change, draw, last_of, made_name
 from playground.ui.editing import EditSession, EditWish, open_source
 from playground.ui.services import Services
@@ -84,3 +85,21 @@ def test_an_edit_of_a_generated_motion(
 
 def test_a_name_that_names_nothing_is_said_so(services: Services) -> None:
     assert "no motion that can be drawn again" in script(services, "?room=edit&motion=made_7&caption=x")["error"]
+
+
+DRAWN = "?room=compare&vary=s&values=0_4&prompt=a+person+%22jumps%22&seconds=2&seed=3"
+
+
+@pytest.mark.parametrize("query", ["?room=compare", "?room=compare&vary=caption&motion=synthetic-walk", DRAWN])
+def test_a_comparison(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, query: str) -> None:
+    state, left = run(services, query, tmp_path, monkeypatch)
+    source = None
+    if query != DRAWN:
+        source = services.example(str(state["motion"])).motion()
+    *_, done = compare_all(services, state.values["settings"], source)
+    assert list(left["results"]) == [one.setting.name for one in done]
+    for one in done:
+        result = left["results"][one.setting.name]
+        found = result if source is None else left["tokens"][one.setting.name]
+        assert ids(found.levels)[: len(one.levels)] == ids(one.levels)
+        assert np.allclose(result.motion.joints, one.motion.joints, atol=1e-5)

@@ -1,12 +1,18 @@
-"""Room 5: what the guidance scale g does to one motion, live in the browser and at five fixed values."""
+"""Room 5: what the guidance scale g does: to one motion, live in the browser; to quality, from a stored sweep."""
 
+import html
 import time
+from pathlib import Path
 from typing import Any
 
 import gradio as gr
 
+from playground.analysis.results import read_result
+from playground.errors import PlaygroundError
 from playground.limits import LIMITS
+from playground.ui.chart import chart
 from playground.ui.errors import attach, message_place
+from playground.ui.facts import as_sentence
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.scenes import guidance_scene, token_facts
@@ -18,16 +24,16 @@ from playground.ui.view import View
 
 NAME = "guidance"
 LEAD = (
-    "The same tokens are decoded twice, with the caption and without. g pushes the result away from the wordless one: "
-    "drag it and watch the first figure; the others stay at 0 to 4."
+    "The same tokens, read with the caption and without. Drag g: the first figure follows, the others stay at 0 to 4."
 )
-DIFFERENCE = (
-    "Not the generator's guidance: that one steers which tokens are chosen. Here the tokens stay as they are and only "
-    "their reading changes."
-)
+DIFFERENCE = "The generator's guidance s chooses other tokens; g leaves them as they are and changes how they are read."
 FIRST = float(control(NAME, "g").default)
 FORMULA = '<p class="mtp-formula">m = (1 + g) · m<sub>words</sub> − g · m<sub>wordless</sub></p>'
 DOING = "Decoding twice"
+HEIGHT = 112  # pixels of the sweep
+MARKING = (Path(__file__).parent.parent / "sweep.js").read_text(encoding="utf-8")
+ITEM = "guidance_sweep"
+SWEEP_LABEL = "Quality of generated motions against g; a click takes g there"
 
 
 def run(services: Services, example_id: str, caption: str, g: float = FIRST) -> View:
@@ -48,6 +54,20 @@ def opening_view(services: Services) -> View:
     """The room's first result: the first example with its own caption."""
     example = services.opening_example()
     return run(services, example.id, example.caption)
+
+
+def sweep(services: Services) -> tuple[str | None, str]:
+    """The stored sweep of the page's system as Plotly JSON text (None where there is none), and one sentence on it."""
+    try:
+        system = services.default_system()
+        found = read_result(ITEM, system.name, services.engine().assets / "results")
+    except PlaygroundError as error:
+        return None, as_sentence(str(error))
+    if found is None:
+        return None, f"FID and R-Precision against g have not been measured for {system.title} yet."
+    from playground.figures.sweep import small_sweep
+
+    return str(small_sweep(found, FIRST).to_json()), f"Measured on {found.line}; bars are 95 % intervals."
 
 
 class Handlers:
@@ -82,13 +102,16 @@ def room(services: Services) -> None:
         with panel("What g does", LEAD):
             g = gr.Slider(0, LIMITS.max_guidance, FIRST, step=0.05, label="Guidance g", elem_id="guidance-g")
             gr.HTML(FORMULA, apply_default_css=False)
-            example = gr.Dropdown(
-                services.example_choices(),
-                value=opening.controls.get("example"),
-                label="Motion",
-                elem_id="guidance-example",
-            )
+            curve, told = sweep(services)
+            if curve is not None:
+                chart(curve, label=SWEEP_LABEL, height=HEIGHT, elem_id="guidance-sweep")
+            gr.HTML(f'<p class="mtp-aside mtp-small">{html.escape(told)}</p>', apply_default_css=False,
+                    elem_id="guidance-measured")  # fmt: skip
             with gr.Row(elem_classes=["mtp-line"]):
+                example = gr.Dropdown(
+                    services.example_choices(), value=opening.controls.get("example"), label="Motion",
+                    elem_id="guidance-example", scale=1, min_width=120,
+                )  # fmt: skip
                 caption = gr.Textbox(
                     opening.controls.get("caption", ""), label="Caption", max_lines=1,
                     elem_id="guidance-caption", scale=1, min_width=120,
@@ -99,6 +122,7 @@ def room(services: Services) -> None:
             gr.HTML(f'<p class="mtp-aside">{DIFFERENCE}</p>', apply_default_css=False)
         words(NAME)
         door = link_door(NAME)
+        gr.HTML("", js_on_load=MARKING, apply_default_css=False, elem_classes=["mtp-unseen"])
     do = Handlers(services)
     shown = [stage, facts, caption]
     attach(example.input, do.choose, [example, g], shown, message, stage=NAME, doing=DOING)
@@ -109,3 +133,4 @@ def room(services: Services) -> None:
     commits(NAME, {"caption": caption}, caption.submit, go.click, forget=("selection",))
     commits(NAME, {"g": g}, g.change)
     g.change(None, [g], None, js=stage_call(NAME, "setGuidance"), api_visibility="private")
+    g.change(None, [g], None, js="(g) => window.mtpMarkGuidance?.(g)", api_visibility="private")

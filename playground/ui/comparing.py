@@ -1,0 +1,196 @@
+"""What the room Compare does: one prompt or motion through two to six settings or systems, and how they differ.
+
+A row of VARIATIONS is one thing that may differ; systems are a row like the others and appear as soon as a second one
+is shipped. `settings_of` gives the settings of a wish, `run` their results one after the other.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+from playground.motion.measures import foot_sliding, mpjpe
+from playground.motion.motion import Motion
+from playground.systems import row_of
+from playground.text.prompts import normalise
+from playground.tokenizers.token_file import LevelTokens
+from playground.ui.facts import bits
+from playground.ui.services import Services
+from playground.ui.uploads import checked_number
+
+PROMPT, MOTION = "prompt", "motion"
+WRONG = "a person lies down"
+Choices = Callable[[Services], Sequence[tuple[str, str]]]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to make a motion from a prompt, or to send a motion through tokens."""
+
+    name: str = ""
+    system: str = ""
+    text: str = ""  # the prompt, or the motion's caption
+    seconds: float = 0.0
+    seed: int = 0
+    cfg: float = 0.0
+    temperature: float = 1.0
+    guidance: float = 0.0
+    scales: int | None = None  # None: all
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One thing that may differ. choices: (what the screen says, what the address says); usual: chosen at first."""
+
+    title: str
+    of: str  # PROMPT | MOTION
+    choices: Choices
+    usual: tuple[str, ...]
+    apply: Callable[[Setting, str], Setting]
+
+    @property
+    def most(self) -> int:
+        """Settings at once; the original motion takes one figure."""
+        return LIMITS.max_figures - (self.of == MOTION)
+
+
+def _listed(unit: str, *values: str) -> Choices:
+    return lambda services: [(unit.format(value), value) for value in values]
+
+
+def _scales(services: Services) -> list[tuple[str, str]]:
+    count = len(services.scales(services.default_system().name))
+    return [(f"{n} scale{'s' if n > 1 else ''}", str(n)) for n in range(1, count + 1)]
+
+
+def _systems(drawing: bool) -> Choices:
+    def shipped(services: Services) -> list[tuple[str, str]]:
+        found = [one for one in services.engine().systems() if one.checkpoint == "shipped"]
+        return [(one.title, one.name) for one in found if one.generator or not drawing]
+
+    return shipped
+
+
+def _with_its_sampling(setting: Setting, system: str) -> Setting:
+    own = row_of(system).sampling
+    return replace(setting, system=system, cfg=own.cfg, guidance=own.guidance, temperature=own.temperature)
+
+
+_WORDS = {"own": "its caption", "none": "no caption", "wrong": f"“{WRONG}”"}
+VARIATIONS: dict[str, Variation] = {
+    "system": Variation("Systems", MOTION, _systems(False), (), lambda s, v: replace(s, system=v)),
+    "scales": Variation(
+        "Scales kept", MOTION, _scales, ("2", "5", "10"), lambda s, v: replace(s, scales=int(v))),
+    "caption": Variation(
+        "Caption", MOTION, lambda services: [(text, key) for key, text in _WORDS.items()], tuple(_WORDS),
+        lambda s, v: s if v == "own" else replace(s, text=WRONG if v == "wrong" else "")),
+    "g": Variation(
+        "Guidance g, decoder", MOTION, _listed("g = {}", "0", "0.5", "1", "2", "3", "4", "6"), ("0", "2", "4"),
+        lambda s, v: replace(s, guidance=float(v))),
+    "maker": Variation("Systems", PROMPT, _systems(True), (), lambda s, v: _with_its_sampling(s, v)),
+    "seed": Variation(
+        "Seed", PROMPT, _listed("seed {}", *map(str, range(10))), ("0", "1", "2", "3"),
+        lambda s, v: replace(s, seed=int(v))),
+    "s": Variation(
+        "Guidance s, generator", PROMPT, _listed("s = {}", "0", "1", "2", "3", "4", "6"), ("0", "3", "6"),
+        lambda s, v: replace(s, cfg=float(v))),
+    "temperature": Variation(
+        "Temperature", PROMPT, _listed("temperature {}", "0", "0.5", "1", "1.5", "2"), ("0", "1", "2"),
+        lambda s, v: replace(s, temperature=float(v))),
+}  # fmt: skip
+
+
+def offered(services: Services) -> list[tuple[str, str]]:
+    """(title, key) of the variations that have at least two choices here."""
+    of = {PROMPT: "from a prompt", MOTION: "of a motion"}
+    return [(f"{v.title}, {of[v.of]}", key) for key, v in VARIATIONS.items() if len(v.choices(services)) > 1]
+
+
+def chosen(services: Services, vary: str, wanted: Sequence[str]) -> list[tuple[str, str]]:
+    """The choices that are wanted, in their order on the screen; the usual ones (or the first) where these are none."""
+    variation = VARIATIONS[vary]
+    choices = list(variation.choices(services))
+    for names in (wanted, variation.usual, [name for _, name in choices]):
+        found = [choice for choice in choices if choice[1] in names]
+        if found:
+            return found
+    return choices
+
+
+def settings_of(
+    services: Services, vary: str, values: Sequence[str], text: str, seconds: object = 4.0, seed: object = 0
+) -> list[Setting]:
+    """The settings side by side. text: the prompt, or the caption of the motion. PlaygroundError for a wrong number."""
+    if vary not in VARIATIONS:
+        raise PlaygroundError(f"what differs is one of {', '.join(VARIATIONS)}")
+    variation, system = VARIATIONS[vary], services.default_system()
+    known = {name for _, name in variation.choices(services)}
+    picked = [value for value in values if value in known]
+    if not 2 <= len(picked) <= variation.most:
+        raise PlaygroundError(f"choose 2 to {variation.most} of them to see side by side; {len(picked)} are chosen")
+    words = normalise(text) if variation.of == PROMPT else text
+    long = checked_number(seconds, "the length in seconds", LIMITS.min_seconds, LIMITS.max_seconds)
+    number = int(checked_number(seed, "the seed", 0, LIMITS.max_seed))
+    own = system.sampling
+    base = Setting("", system.name, words, long, number, own.cfg, own.temperature, own.guidance)
+    base = replace(base, guidance=0.0) if variation.of == MOTION else base
+    return [
+        variation.apply(replace(base, name=title[:1].upper() + title[1:]), name)
+        for title, name in chosen(services, vary, picked)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What one setting gave. error_mm: against the original, or where there is none against the first result."""
+
+    setting: Setting
+    motion: Motion
+    levels: tuple[LevelTokens, ...]
+    error_mm: float | None
+    seconds: float
+
+    @property
+    def tokens(self) -> int:
+        """Tokens that were used."""
+        return sum(level.size for level in self.levels)
+
+    @property
+    def bits(self) -> float:
+        """What it takes to write them down."""
+        return bits([level.size for level in self.levels], [level.codes for level in self.levels])
+
+    @property
+    def sliding(self) -> float:
+        """Foot sliding in mm/s, nan where no toe touches the ground."""
+        return foot_sliding(self.motion.joints)
+
+
+def run(services: Services, settings: Sequence[Setting], source: Motion | None) -> Iterator[list[Compared]]:
+    """The results so far, after each setting. source: the motion that goes through, None for motions from a prompt."""
+    done: list[Compared] = []
+    for system in {setting.system for setting in settings}:
+        services.palettes(system)  # loads its models, so that no setting is timed with them
+    for setting in settings:
+        done.append(_generated(services, setting, done) if source is None else _rebuilt(services, setting, source))
+        yield list(done)
+
+
+def _generated(services: Services, setting: Setting, done: Sequence[Compared]) -> Compared:
+    began = time.perf_counter()
+    made = services.engine().generate(
+        setting.text, setting.seconds, setting.system, setting.seed, guidance=setting.guidance, cfg=setting.cfg,
+        temperature=setting.temperature,
+    )  # fmt: skip
+    taken = time.perf_counter() - began
+    error = mpjpe(done[0].motion.joints, made.motion.joints) if done else None
+    return Compared(setting, made.motion, made.levels, error, taken)
+
+
+def _rebuilt(services: Services, setting: Setting, source: Motion) -> Compared:
+    engine = services.engine()
+    tokenized = engine.tokenize(source, setting.text, system=setting.system)
+    decoded = engine.reconstruct(tokenized, guidance=setting.guidance, scales=setting.scales)
+    taken = tokenized.seconds + decoded.seconds
+    return Compared(setting, decoded.motion, tokenized.levels[: setting.scales], decoded.mpjpe_mm, taken)

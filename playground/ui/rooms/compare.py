@@ -1,0 +1,185 @@
+"""Room 7: one prompt or motion through two to six settings or systems, in sync, with their differences in a table."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import gradio as gr
+
+from playground.errors import PlaygroundError
+from playground.limits import LIMITS
+from playground.motion.motion import Motion
+from playground.ui.compared import compared_view
+from playground.ui.comparing import MOTION, PROMPT, VARIATIONS, Compared, chosen, offered, run, settings_of
+from playground.ui.errors import attach, message_place
+from playground.ui.layout import panel, room_frame, stage_and_score, words
+from playground.ui.links import arrival, asked, commits, link_door
+from playground.ui.services import Services
+from playground.ui.state import control
+from playground.ui.view import View
+
+NAME = "compare"
+LEAD = "One motion or prompt, several settings in sync. Choose what differs; the table says by how much."
+DOING = "Running every setting"
+WISHES = ("vary", "values", "prompt", "seconds", "seed", "motion")  # keys of the table of controls
+USUAL = str(control(NAME, "vary").default)
+KEEP = """(vary, values, prompt, seconds, seed, motion) => window.mtpState?.keep(
+  'compare', ['vary', 'values', 'prompt', 'seconds', 'seed', 'motion', 'take', 'selection'],
+  [vary, values.join('_'), prompt, seconds, seed, motion, null, null]);"""
+KEEP_TAKE = "(take) => window.mtpState?.keep('compare', ['take'], [Number(take) || null])"
+
+
+@dataclass(eq=False)
+class Held:
+    """What one visitor compares."""
+
+    done: list[Compared] = field(default_factory=list)
+    source: Motion | None = None
+    name: str = ""
+
+
+def compare(services: Services, held: Held, *values: Any, take: int = 0) -> Iterator[View]:
+    """A view after every setting; `values` are those of WISHES."""
+    vary, picked, prompt, seconds, seed, motion = values
+    if vary not in VARIATIONS:
+        raise PlaygroundError(f"what differs is one of {', '.join(VARIATIONS)}")
+    if VARIATIONS[vary].of == MOTION:
+        example = services.example(motion or services.opening_example().id)
+        text, held.name, held.source = example.caption, example.title, example.motion()
+    else:
+        text, held.name, held.source = prompt, str(prompt or ""), None
+    settings = settings_of(services, vary, picked or (), text, seconds, seed)
+    for done in run(services, settings, held.source):
+        held.done = done
+        yield compared_view(services, done, held.source, held.name, take)
+
+
+def opening_view(services: Services) -> View:
+    """The room's first result: a motion rebuilt from fewer and from more scales."""
+    example = services.opening_example()
+    picked = [name for _, name in chosen(services, USUAL, ())]
+    *_, last = compare(services, Held(), USUAL, picked, "", 4.0, 0, example.id)
+    return View(last.stage, controls={**last.controls, "motion": example.id}, seconds=last.seconds)
+
+
+class Handlers:
+    """What the controls do. A result is stage, table, and the choice whose tokens are shown."""
+
+    def __init__(self, services: Services) -> None:
+        self.services = services
+
+    def set_vary(self, vary: str) -> tuple[Any, ...]:
+        """Another thing that differs: its choices, and prompt or motion as it needs them."""
+        of = VARIATIONS[vary].of if vary in VARIATIONS else PROMPT
+        picked = [name for _, name in chosen(self.services, vary, ())][: VARIATIONS[vary].most]
+        return (self._values(vary, picked), *(gr.update(visible=of == one) for one in (PROMPT, MOTION)))
+
+    def compare(self, held: Held, *values: Any, take: int = 0) -> Iterator[tuple[Any, ...]]:
+        """All settings, one after the other."""
+        for view in compare(self.services, held, *values, take=take):
+            yield view.stage_json(), view.controls["table"], self._which(held, take)
+
+    def look_at(self, held: Held, place: str) -> tuple[Any, ...]:
+        """The tokens of another one."""
+        if not held.done:
+            raise PlaygroundError("press Compare first; then the tokens of each can be shown")
+        view = compared_view(self.services, held.done, held.source, held.name, int(place))
+        return (view.stage_json(),)
+
+    def arrive(self, held: Held, event: gr.EventData) -> Iterator[tuple[Any, ...]]:
+        """What a link asks for: the controls, then the results."""
+        state = asked(event)
+        vary = state["vary"] if state["vary"] in [key for _, key in offered(self.services)] else USUAL
+        wanted = [name for _, name in chosen(self.services, vary, str(state["values"] or "").split("_"))]
+        wanted = wanted[: VARIATIONS[vary].most]
+        known = {one.id for one in self.services.examples()}
+        motion = state["motion"] if state["motion"] in known else self.services.opening_example().id
+        rest = (state["prompt"], state["seconds"], state["seed"], motion)
+        _, *rows = self.set_vary(vary)
+        asks, controls = (vary, wanted, *rest), (vary, self._values(vary, wanted), *rest, *rows)
+        for shown in self.compare(held, *asks, take=int(state["take"])):
+            yield *shown, *controls
+
+    def _values(self, vary: str, picked: list[str]) -> Any:
+        variation = VARIATIONS[vary]
+        label = f"{control(NAME, 'values').label}, 2 to {variation.most}"
+        return gr.update(choices=list(variation.choices(self.services)), value=picked, label=label)
+
+    def _which(self, held: Held, take: int) -> Any:
+        choices = [(one.setting.name, str(n)) for n, one in enumerate(held.done)]
+        return gr.update(choices=choices, value=str(min(take, len(choices) - 1)), visible=len(choices) > 1)
+
+
+def room(services: Services) -> None:
+    """Build the room inside the current tab."""
+    opening = services.first_view(NAME, opening_view)
+    held = gr.State(Held(), time_to_live=LIMITS.session_seconds)
+    with room_frame(NAME):
+        stage = stage_and_score(NAME, opening)
+        with panel("Side by side", LEAD):
+            wishes, rows, go = _controls(services, opening)
+            message = message_place("compare-message")
+            table = gr.HTML(opening.controls.get("table", ""), elem_id="compare-table", apply_default_css=False)
+            which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="compare-take")
+        words(NAME)
+        door = link_door(NAME)
+    do = Handlers(services)
+    asks, shown = [wishes[key] for key in WISHES], [stage, table, which]
+    silent: dict[str, Any] = {"api_visibility": "private"}
+    attach(wishes["vary"].input, do.set_vary, [wishes["vary"]], [wishes["values"], *rows], message, model=False)
+    for event in (go.click, wishes["prompt"].submit):
+        attach(event, do.compare, [held, *asks], shown, message, stage=NAME, doing=DOING)
+        event(None, asks, None, js=KEEP, **silent)
+    attach(which.input, do.look_at, [held, which], [stage], message, model=False)
+    which.input(None, [which], None, js=KEEP_TAKE, **silent)
+    arrival(door, do.arrive, [held], [*shown, *asks, *rows], message, room=NAME, stage=NAME, doing=DOING)
+    commits(NAME, {"motion": wishes["motion"]}, wishes["motion"].input, forget=("selection",))
+
+
+def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[Any], Any]:
+    """The controls by their keys, the rows for a prompt and for a motion, and the button."""
+    found: dict[str, Any] = {}
+    variation, picked = VARIATIONS[USUAL], [name for _, name in chosen_or_none(services)]
+    with gr.Row(elem_classes=["mtp-line"]):
+        found["vary"] = gr.Dropdown(
+            offered_or_none(services), value=USUAL, label=control(NAME, "vary").label, elem_id="compare-vary", scale=1,
+            min_width=160,
+        )  # fmt: skip
+        go = gr.Button("Compare", variant="primary", size="sm", scale=0, min_width=84, elem_id="compare-go")
+    found["values"] = gr.CheckboxGroup(
+        list(variation.choices(services)) if picked else [], value=picked, elem_id="compare-values",
+        label=f"{control(NAME, 'values').label}, 2 to {variation.most}",
+    )  # fmt: skip
+    with gr.Row(elem_classes=["mtp-line"], visible=variation.of == PROMPT) as of_prompt:
+        found["prompt"] = gr.Textbox(
+            control(NAME, "prompt").default, label=control(NAME, "prompt").label, max_lines=1, scale=1, min_width=120,
+            elem_id="compare-prompt",
+        )  # fmt: skip
+        for key, places in (("seconds", 1), ("seed", 0)):
+            row = control(NAME, key)
+            found[key] = gr.Number(
+                row.default, label=row.label, precision=places, minimum=row.low, maximum=row.high, scale=0,
+                min_width=72, elem_id=row.element,
+            )  # fmt: skip
+    with gr.Row(elem_classes=["mtp-line"], visible=variation.of == MOTION) as of_motion:
+        found["motion"] = gr.Dropdown(
+            services.example_choices(), value=opening.controls.get("motion"), label=control(NAME, "motion").label,
+            elem_id="compare-example", scale=1, min_width=160,
+        )  # fmt: skip
+    return found, [of_prompt, of_motion], go
+
+
+def chosen_or_none(services: Services) -> list[tuple[str, str]]:
+    """The choices of the first variation; none where no system is shipped."""
+    try:
+        return chosen(services, USUAL, ())
+    except PlaygroundError:
+        return []
+
+
+def offered_or_none(services: Services) -> list[tuple[str, str]]:
+    """What may differ; none where no system is shipped."""
+    try:
+        return offered(services)
+    except PlaygroundError:
+        return []

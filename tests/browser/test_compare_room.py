@@ -1,0 +1,67 @@
+"""Compare as a visitor uses it: another thing that differs, more of it, whose tokens, a link, a phone."""
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import PHONE, Visit
+
+pytestmark = pytest.mark.browser
+Go = Callable[..., Visit]
+SHOWN = "(n) => window.MotionStage?.get('compare')?.data?.figures.length === n"
+
+
+@pytest.fixture
+def seen(visit: Go, stand_in: str) -> Visit:
+    found = visit(f"{stand_in}?room=compare")
+    found.page.wait_for_function(SHOWN, arg=4)
+    found.settle()
+    return found
+
+
+def test_settings_stand_side_by_side_and_the_best_is_marked(seen: Visit, visit: Go) -> None:
+    page = seen.page
+    expect(page.locator("#compare-table tbody tr")).to_have_count(3)
+    expect(page.locator("#compare-table tbody tr").last.locator("td").first.locator("strong")).to_have_count(1)
+    page.get_by_label("5 scales", exact=True).uncheck()
+    page.get_by_label("7 scales", exact=True).check()
+    page.locator("#compare-go").click()
+    expect(page.locator("#compare-table")).to_contain_text("7 scales")
+    page.locator("#compare-take label", has_text="7 scales").click()
+    expect(page.locator("#compare-score .ms-heads")).to_contain_text("7 scales")
+    page.wait_for_url(lambda url: "values=2_7_10" in url and "take=1" in url)
+    other = visit(page.url).page
+    expect(other.locator("#compare-score .ms-heads")).to_contain_text("7 scales")
+    expect(other.locator("#compare-table tbody tr")).to_have_count(3)
+    expect(other.get_by_label("7 scales", exact=True)).to_be_checked()
+    assert seen.complaints == []
+
+
+def test_a_prompt_with_other_seeds(seen: Visit) -> None:
+    page = seen.page
+    page.locator("#compare-vary input").click()
+    page.get_by_role("option", name="Seed, from a prompt").click()
+    prompt = page.locator("#compare-prompt").locator("input, textarea")
+    expect(prompt).to_be_visible()
+    expect(page.locator("#compare-example")).to_have_count(0)
+    prompt.fill("a person hops")
+    page.locator("#compare-go").click()
+    page.wait_for_function(SHOWN, arg=4)
+    expect(page.locator("#compare-table")).to_contain_text("“a person hops”")
+    expect(page.locator("#compare-table thead")).to_contain_text("from the first")
+
+
+def test_one_alone_is_refused_in_a_sentence(seen: Visit) -> None:
+    page = seen.page
+    for name in ("5 scales", "10 scales"):
+        page.get_by_label(name, exact=True).uncheck()
+    page.locator("#compare-go").click()
+    expect(page.locator("#compare-message [role=alert]")).to_contain_text("Choose 2 to 5 of them")
+    expect(page.locator("#compare-table tbody tr")).to_have_count(3)
+
+
+def test_a_phone_never_scrolls_sideways(visit: Go, stand_in: str) -> None:
+    page = visit(f"{stand_in}?room=compare", viewport=PHONE, has_touch=True, is_mobile=True).page
+    page.wait_for_function(SHOWN, arg=4)
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
