@@ -59,7 +59,8 @@ def usage_panels(
     """A small panel a scale on one frequency axis. One system has the colours of the scales, several have their own.
 
     usages: system name -> usage, all with the same number of scales; sizes: tokens a scale; titles: system name -> the
-    name to print. Several systems are drawn over shares of the codebook, so that codebooks of different size compare.
+    name to print. customdata of a point begins with "system.scale.code", scale from 1. Several systems are drawn over
+    shares of the codebook, so that codebooks of different size compare.
     """
     names = list(usages)
     levels = len(sizes)
@@ -69,7 +70,7 @@ def usage_panels(
     rows = -(-levels // columns)
     heads = [f"scale {n + 1} · {size} token{'s' if size > 1 else ''}" for n, size in enumerate(sizes)]
     if len(names) == 1:
-        heads = [f"{head}<br>{_facts(usages[names[0]], n)}" for n, head in enumerate(heads)]
+        heads = [f"{head}<br>{_facts(usages[names[0]], n, 'perpl.')}" for n, head in enumerate(heads)]
     figure = make_subplots(
         rows, columns, shared_yaxes=True, horizontal_spacing=0.02, vertical_spacing=0.2, subplot_titles=heads
     )
@@ -141,11 +142,11 @@ def _codes(usage: CodeUsage, scale: int, order: str) -> NDArray[np.int64]:
     return np.argsort(-count, kind="stable") if order == "sorted" else np.arange(len(count))
 
 
-def _facts(usage: CodeUsage, scale: int) -> str:
+def _facts(usage: CodeUsage, scale: int, word: str = "perplexity") -> str:
     """Used share and perplexity of one scale, on one line."""
     if not usage.totals_[scale]:
         return "no tokens counted"
-    return f"{percent(usage.used_[scale])} used, perplexity {readable(usage.perplexity_[scale])}"
+    return f"{percent(usage.used_[scale])} used, {word} {readable(usage.perplexity_[scale])}"
 
 
 def _curve(usage: CodeUsage, level: int, order: str, name: str, alone: bool) -> go.Scatter:
@@ -159,10 +160,11 @@ def _curve(usage: CodeUsage, level: int, order: str, name: str, alone: bool) -> 
         color = system_color(name)
         light, dark, dash = color.light, color.dark, color.dash
     return go.Scatter(
-        x=listed(x), y=listed(values), customdata=codes.tolist(), mode="lines", showlegend=False, name=name,
+        x=listed(x), y=listed(values), mode="lines", showlegend=False, name=name,
+        customdata=[[f"{name}.{level + 1}.{code}", code] for code in codes.tolist()],
         line={"color": light, "width": 1.5, "shape": "hvh", "dash": dash}, fill="tozeroy" if alone else "none",
         fillcolor=_faded(light), meta={"dark": {"line.color": dark, "fillcolor": _faded(dark)}},
-        hovertemplate="code %{customdata}: %{y:.2f} times even use<extra></extra>",
+        hovertemplate="code %{customdata[1]}: %{y:.2f} times even use<extra></extra>",
     )  # fmt: skip
 
 

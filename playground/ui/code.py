@@ -139,6 +139,20 @@ def _codebooks(state: State) -> tuple[str, str]:
         "for scale, (tokens, codes) in enumerate(zip(bundle.sizes, bundle.codes)):\n"
         "    dead, perplexity = len(usage.dead_[scale]), usage.perplexity_[scale]\n"
         '    print(f"scale {scale + 1}: {tokens} tokens, {codes} codes, {dead} dead, perplexity {perplexity:.1f}")\n'
+        + _code_of(state)
+    )
+
+
+def _code_of(state: State) -> str:
+    """The code of the card: what is like it, and the motion that it stands for."""
+    system, *places = str(state["code"] or "").rsplit(".", 2)
+    if len(places) != 2 or not all(number.isascii() and number.isdigit() for number in places):
+        return ""
+    place = f"{_literal(system)}, scale={int(places[0])}, code={int(places[1])}"
+    return (
+        "\nfrom playground.engine import default_engine\n\n"
+        f"like = default_engine().neighbours({place})\nprototype = default_engine().prototype({place})\n"
+        'print("codes like it:", *like.codes, " frames of the motion it stands for:", prototype.motion.frames)\n'
     )
 
 

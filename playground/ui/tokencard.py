@@ -5,7 +5,7 @@ Buttons carry data-do and data-code for inspector.py; links carry data-state, so
 
 import html
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
 import numpy as np
@@ -71,8 +71,26 @@ def occurrences(bundle: "Bundle | None", scale: int, code: int) -> str:
         f"In {len(rows)} of {len(bundle)} {bundle.split} clips of {bundle.data}; {len(places)} of {total:,} tokens of "
         f"scale {scale}."
     )
-    items = "".join(f"<li>{_place(bundle, row, scale, first[row])}</li>" for row in list(rows)[:LISTED])
+    kinds = {bundle.clips[row].caption: row for row in reversed(rows)}  # what differs comes first
+    shown = list(dict.fromkeys([*(row for row in rows if row in kinds.values()), *rows]))[:LISTED]
+    items = "".join(f"<li>{_place(bundle, row, scale, first[row])}</li>" for row in shown)
     return f'<p class="mtp-aside">{html.escape(counted)}</p><ul class="mtp-places">{items}</ul>'
+
+
+def code_card(bundle: "Bundle", scale: int, code: int, like: "Neighbours | None", palette: Any) -> str:
+    """The card of a code of a codebook: how often it is used, what is like it, where it stands."""
+    counts = bundle.usage.counts_[scale - 1]
+    count, total, codes = int(counts[code]), int(bundle.usage.totals_[scale - 1]), len(counts)
+    rank = int((counts > count).sum()) + 1
+    used = f"{count:,} of {total:,} tokens, {significant(count * codes / max(total, 1))} times even use, rank {rank}"
+    told = f"<strong>Used by {used}</strong> of {codes} codes." if count else "<strong>Dead:</strong> no clip needs it."
+    head = (
+        f'<div class="mtp-token-head"><h2>{swatch(palette[code] if palette is not None else None)}Code {code}</h2>'
+        f"<span>scale {scale}</span></div>"
+    )
+    alike = f"<h3>Codes most like it</h3>{like_chips(like, palette, 'code')}" if like else ""
+    where = f"<h3>Where it stands</h3>{occurrences(bundle, scale, code)}" if count else ""
+    return f'<div class="mtp-token">{head}<p>{told}</p>{alike}{where}</div>'
 
 
 def _place(bundle: "Bundle", row: int, scale: int, position: int) -> str:

@@ -257,11 +257,32 @@ def test_a_long_upload_shows_its_window(seen: Visit, tmp_path: Path) -> None:
 def test_codebooks_show_use_perplexity_and_dead_codes(seen: Visit) -> None:
     page = seen.enter("Codebooks")
     expect(page.locator("#codebooks-facts")).to_contain_text("dead")
+    page.get_by_role("button", name="All numbers, scale by scale").click()
     expect(page.locator("#codebooks-table tbody tr")).to_have_count(10)
     expect(page.locator("#codebooks-table thead")).to_contain_text("perplexity")
     panels = page.locator("#codebooks-panels .subplot")
     expect(panels).to_have_count(10)
     axis = page.locator("#codebooks-panels")
     expect(axis).to_contain_text("most used first")
-    page.get_by_label("by number").check()
+    page.get_by_role("radio", name="by number").check()
     expect(axis).to_contain_text("code id")
+
+
+def test_a_click_on_a_curve_shows_what_the_code_stands_for(seen: Visit) -> None:
+    page = seen.enter("Codebooks")
+    expect(page.locator("#codebooks-stage .ms-labels")).to_contain_text("of scale 1")
+    page.wait_for_function("() => document.querySelector('#codebooks-panels .mtp-chart')?._fullLayout?.xaxis5")
+    place = page.locator("#codebooks-panels .mtp-chart").evaluate(
+        """(box) => {
+          const { xaxis5: x, yaxis5: y } = box._fullLayout, trace = box.data[4], at = box.getBoundingClientRect();
+          return [at.x + x._offset + x.d2p(trace.x[3]), at.y + y._offset + y.d2p(trace.y[3])];
+        }"""
+    )
+    page.mouse.move(place[0], place[1] + 1)
+    page.wait_for_timeout(300)
+    page.mouse.click(place[0], place[1] + 1)
+    expect(page.locator("#codebooks-card")).to_contain_text("scale 5")
+    expect(page.locator("#codebooks-stage .ms-labels")).to_contain_text("of scale 5")
+    expect(page).to_have_url(re.compile(r"code=lgtok-lite\.5\.\d+"))
+    page.reload()
+    expect(page.locator("#codebooks-card")).to_contain_text("scale 5")

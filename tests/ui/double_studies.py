@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from playground.engine.checks import check_code, whole
 from playground.engine.codes import nearest
 from playground.engine.microscope import with_code
 from playground.errors import PlaygroundError
@@ -37,13 +38,19 @@ class Studies:
 
     def neighbours(self, system: str, scale: int, code: int, count: int = 8) -> Neighbours:
         self.calls.append("neighbours")
+        self._check(system, scale, code)
         return nearest(self.codebooks(system)[scale - 1].astype(np.float32), system, scale, code, count)
 
     def prototype(self, system: str, scale: int, code: int, seconds: float = 2.0) -> Decoded:
         self.calls.append(f"prototype {scale}.{code}")
+        self._check(system, scale, code)
         frames = int(20 * seconds) // 4 * 4
         joints = np.resize(still(), (frames, 22, 3)) + 0.001 * code
         return Decoded(Motion(joints.astype(np.float32)), np.zeros((frames, 67), np.float32), None, 0.0, 1, 0.02)
+
+    def _check(self, system: str, scale: int, code: int) -> None:
+        sizes = [len(codebook) for codebook in self.codebooks(system)]
+        check_code(sizes[whole(scale, "the scale", 1, len(sizes)) - 1], scale, code)
 
     def swap(self, result: Tokenized, scale: int, position: int, code: int, guidance: float = 0.0) -> Swap:
         self.calls.append(f"swap {scale}.{position}.{code}")

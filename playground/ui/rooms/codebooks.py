@@ -1,110 +1,241 @@
-"""Room 3: which codes are used, how evenly, at which scale; which are dead."""
+"""Room 3: which codes are used, how evenly, at which scale; which are dead; what one of them stands for."""
 
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gradio as gr
 
-from playground.analysis.bundle import Bundle
+from playground.analysis.bundle import Bundle, stored_systems
 from playground.errors import PlaygroundError
+from playground.figures import stage as scene
+from playground.figures.coverage import usage_lines
 from playground.figures.theme import percent, readable
-from playground.figures.usage import usage_panels, usage_summary
+from playground.figures.usage import usage_panels
+from playground.systems import row_of
 from playground.ui.cards import term
 from playground.ui.chart import chart
 from playground.ui.errors import attach, error_line, message_place
 from playground.ui.facts import Fact, facts_line, table
+from playground.ui.inspector import inspector
 from playground.ui.layout import panel, room_frame, words
 from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.services import Services
+from playground.ui.stage.component import stage_component
+from playground.ui.state import control
+from playground.ui.tokencard import code_card
+from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
 NAME = "codebooks"
 LEAD = (
-    "Every scale has its own list of codes; a panel shows how often each of them is used. At the dashed line all would "
-    "be used alike, on the ground a code is never used."
+    "Every scale has its own list of codes; a panel shows how often each is used. The dashed line is even use. "
+    "Click a curve: what does that code stand for?"
 )
 ORDERS = [("most used first", "sorted"), ("by number", "index")]
-PANELS, SUMMARY = 410, 216
+PANELS, LINES, FIGURE = 410, 200, 196  # pixels
+DOING = "Decoding the code"
+PROTOTYPE = "its scale alone, all tokens this code, no words"
 
 
-def panels(bundle: Bundle, title: str, order: str) -> str:
-    """The histograms of all scales as Plotly JSON text. order: "sorted" or "index"."""
-    return str(
-        usage_panels({bundle.system: bundle.usage}, bundle.sizes, order=order, titles={bundle.system: title}).to_json()
-    )
+@dataclass(frozen=True)
+class Wish:
+    """What the controls ask for."""
+
+    systems: tuple[str, ...]
+    order: str
+    k: int
+
+    @classmethod
+    def checked(cls, services: Services, systems: Sequence[str], order: object, k: object) -> "Wish":
+        """From the controls. PlaygroundError for what the room does not have."""
+        known = shown_systems(services)
+        if not systems or any(name not in known for name in systems):
+            raise PlaygroundError("choose at least one of the systems whose code usage is stored")
+        if order not in [value for _, value in ORDERS]:
+            raise PlaygroundError("codes are ordered by use or by number")
+        low, high = control(NAME, "k").low, control(NAME, "k").high
+        return cls(tuple(name for name in known if name in systems), str(order), int(checked_number(k, "k", low, high)))
 
 
-def summary(bundle: Bundle, title: str) -> str:
-    """Share of codes used and perplexity over the scales, as Plotly JSON text."""
-    figure = usage_summary({bundle.system: bundle.usage}, bundle.sizes, titles={bundle.system: title}, height=SUMMARY)
+def shown_systems(services: Services) -> list[str]:
+    """The systems whose analysis is stored and whose checkpoint is here, in the order of the table."""
+    stored = stored_systems(services.engine().assets / "analysis")
+    return [system.name for system in services.shipped() if system.name in stored]
+
+
+def panels(services: Services, wish: Wish) -> str:
+    """How often each code is used, scale by scale, as Plotly JSON text: all systems that have as many scales as the
+    first one."""
+    bundles = [services.bundle(name) for name in wish.systems]
+    alike = [bundle for bundle in bundles if len(bundle.sizes) == len(bundles[0].sizes)]
+    titles = {bundle.system: row_of(bundle.system).title for bundle in alike}
+    usages = {bundle.system: bundle.usage for bundle in alike}
+    figure = usage_panels(usages, alike[0].sizes, order=wish.order, titles=titles)
+    figure.update_layout(hoverdistance=60)
     return str(figure.to_json())
 
 
-def scale_table(bundle: Bundle) -> str:
-    """One row a scale, as an HTML table."""
-    usage = bundle.usage
+def lines(services: Services, wish: Wish) -> str:
+    """Codes used, perplexity and share of the top k over the scales, as Plotly JSON text."""
+    usages = {name: services.bundle(name).usage for name in wish.systems}
+    titles = {name: row_of(name).title for name in wish.systems}
+    return str(usage_lines(usages, wish.k, titles=titles, height=LINES).to_json())
+
+
+def scale_table(services: Services, wish: Wish) -> str:
+    """One row a scale of every system, as HTML tables."""
+    return "".join(_table(services.bundle(name), wish.k) for name in wish.systems)
+
+
+def _table(bundle: Bundle, k: int) -> str:
+    usage, covered = bundle.usage, bundle.usage.coverage(k)
     rows = [
-        [
-            str(n + 1),
-            str(size),
-            str(codes),
-            percent(usage.used_[n]),
-            str(len(usage.dead_[n])),
-            readable(usage.perplexity_[n]),
-        ]
+        [str(n + 1), str(size), str(codes), percent(usage.used_[n]), str(len(usage.dead_[n])),
+         readable(usage.perplexity_[n]), percent(covered[n])]
         for n, (size, codes) in enumerate(zip(bundle.sizes, bundle.codes, strict=True))
-    ]
-    return table(["scale", "tokens", "codes", "used", "dead", "perplexity"], rows, f"Measured on {bundle.provenance}")
+    ]  # fmt: skip
+    heads = ["scale", "tokens", "codes", "used", "dead", "perplexity", f"top {k} cover"]
+    return table(heads, rows, f"Measured on {bundle.provenance}")
 
 
-def opening_view(services: Services) -> View:
-    """All that the room shows."""
-    system = services.default_system()
-    bundle = services.bundle(system.name)
+def facts(services: Services, wish: Wish) -> tuple[Fact, ...]:
+    """Numbers of the first system over all its scales."""
+    bundle = services.bundle(wish.systems[0])
     usage = bundle.usage
     dead = sum(len(codes) for codes in usage.dead_)
-    facts = (
+    return (
         Fact(percent(usage.used_all_), f"of {sum(bundle.codes):,} codes used", term("codes used")),
         Fact(f"{dead:,}", "dead", term("dead code")),
         Fact(f"{int(usage.totals_.sum()):,}", "tokens counted"),
     )
+
+
+def code_view(services: Services, system: str, scale: int, code: int) -> View:
+    """The motion that a code stands for, and its card."""
+    began = time.perf_counter()
+    engine, bundle = services.engine(), services.bundle(system)
+    made = engine.prototype(system, scale, code)
+    palette = services.palettes(system)[scale - 1]
+    like = engine.neighbours(system, scale, code) if len(palette) > 1 else None
+    shown = scene.figure("prototype", f"Code {code} of scale {scale}", made.motion.joints, system, PROTOTYPE)
     return View(
-        stage={},
-        facts=facts,
-        charts={order: panels(bundle, system.title, order) for _, order in ORDERS}
-        | {"summary": summary(bundle, system.title)},
-        controls={"table": scale_table(bundle)},
-        kind="stored",
+        stage=scene.payload([shown], scene=f"{system}.{scale}.{code}"),
+        controls={"code": f"{system}.{scale}.{code}", "card": code_card(bundle, scale, code, like, palette)},
+        seconds=time.perf_counter() - began,
     )
+
+
+def opening_view(services: Services) -> View:
+    """All that the room shows at first: the usual system, and the code that its first scale uses most."""
+    first = services.default_system().name
+    wish = Wish((first,), "sorted", int(control(NAME, "k").default))
+    view = code_view(services, first, 1, int(services.bundle(first).usage.counts_[0].argmax()))
+    charts = {"panels": panels(services, wish), "lines": lines(services, wish)}
+    told = {**view.controls, "table": scale_table(services, wish), "system": first}
+    return View(view.stage, facts(services, wish), charts, told, "stored", view.seconds)
+
+
+def place_of(text: object) -> tuple[str, int, int]:
+    """("lgtok-lite", 5, 201) from "lgtok-lite.5.201". PlaygroundError for anything else."""
+    system, *numbers = str(text).rsplit(".", 2)
+    if len(numbers) != 2 or not all(number.isascii() and number.isdigit() and len(number) < 7 for number in numbers):
+        raise PlaygroundError("choose a code by a click on a curve")
+    return row_of(system).name, int(numbers[0]), int(numbers[1])
+
+
+class Handlers:
+    """What the controls do."""
+
+    def __init__(self, services: Services, opening: View) -> None:
+        self.services = services
+        self.opening = opening
+
+    def draw(self, systems: Sequence[str], order: str, k: float) -> tuple[Any, ...]:
+        """Both charts, the numbers and the table."""
+        services, wish = self.services, Wish.checked(self.services, systems, order, k)
+        told = facts_line(facts(services, wish))
+        return panels(services, wish), lines(services, wish), told, scale_table(services, wish)
+
+    def show(self, text: object) -> tuple[Any, ...]:
+        """A code by its "system.scale.code": the stage, the card, and the same text for the address."""
+        view = code_view(self.services, *place_of(text))
+        return view.stage_json(), view.controls["card"], view.controls["code"]
+
+    def pick(self, event: gr.EventData) -> tuple[Any, ...]:
+        """A point of a curve."""
+        return self.show(event.id)
+
+    def act(self, current: str, event: gr.EventData) -> tuple[Any, ...]:
+        """A button of the card: a code of the same scale."""
+        system, scale, _ = place_of(current)
+        return self.show(f"{system}.{scale}.{event.code}")
+
+    def arrive(self, event: gr.EventData) -> tuple[Any, ...]:
+        """What a link asks for; what is not stored here gives way to what the room opens with."""
+        state = asked(event)
+        known = shown_systems(self.services)
+        systems = [name for name in state["system"] or () if name in known] or [self.services.default_system().name]
+        drawn = self.draw(systems, state["order"], state["k"])
+        try:
+            shown = self.show(state["code"] or self.opening.controls.get("code"))
+        except PlaygroundError:
+            shown = self.show(self.opening.controls.get("code"))
+        return systems, state["order"], state["k"], *drawn, *shown
 
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
     trouble = opening.stage.get("message", "")
-    with room_frame("codebooks"):
+    with room_frame(NAME):
         with gr.Column(elem_classes=["mtp-main"], min_width=0):
-            plot = chart(opening.charts.get("sorted"), label="How often each code is used, one panel a scale",
+            plot = chart(opening.charts.get("panels"), label="How often each code is used, one panel a scale",
                          height=PANELS, elem_id="codebooks-panels", narrowest=820)  # fmt: skip
-            chart(opening.charts.get("summary"), label="Share of codes used and perplexity, by scale", height=SUMMARY,
-                  elem_id="codebooks-summary", narrowest=560)  # fmt: skip
+            over = chart(opening.charts.get("lines"), label="Codes used, perplexity and top codes, by scale",
+                         height=LINES, elem_id="codebooks-summary", narrowest=720)  # fmt: skip
+            with gr.Accordion("All numbers, scale by scale", open=False, elem_classes=["mtp-fold"]):
+                numbers = gr.HTML(opening.controls.get("table", ""), elem_id="codebooks-table", apply_default_css=False)
         with panel("Which codes are used", LEAD):
-            order = gr.Radio(ORDERS, value="sorted", label="Order of the codes", elem_id="codebooks-order")
+            system, order, k = _controls(services, opening)
             message = message_place("codebooks-message")
-            gr.HTML(error_line(trouble) if trouble else facts_line(opening.facts), elem_id="codebooks-facts",
-                    apply_default_css=False)  # fmt: skip
-            gr.HTML(opening.controls.get("table", ""), elem_id="codebooks-table", apply_default_css=False)
-        words("codebooks")
+            known = gr.HTML(error_line(trouble) if trouble else facts_line(opening.facts), elem_id="codebooks-facts",
+                            apply_default_css=False)  # fmt: skip
+            stage = stage_component(NAME, opening.stage_json(), FIGURE, elem_id="codebooks-stage", container=False,
+                                    elem_classes=["mtp-small-stage"])  # fmt: skip
+            card = inspector(opening.controls.get("card", ""), elem_id="codebooks-card")
+            current = gr.Textbox(opening.controls.get("code"), visible="hidden", elem_id="codebooks-current")
+        words(NAME)
         door = link_door(NAME)
-
-    def reorder(wanted: str) -> tuple[Any, ...]:
-        if wanted not in opening.charts:
-            raise PlaygroundError("codes are ordered by use or by number")
-        return (opening.charts[wanted],)
-
-    def arrive(event: gr.EventData) -> tuple[Any, ...]:
-        wanted = asked(event)["order"]
-        return wanted, *reorder(wanted)
-
-    attach(order.input, reorder, [order], [plot], message, model=False)
-    arrival(door, arrive, [], [order, plot], message, room=NAME, model=False)
+    do = Handlers(services, opening)
+    drawn, shown = [plot, over, known, numbers], [stage, card, current]
+    for event in (system.input, order.input, k.release):
+        attach(event, do.draw, [system, order, k], drawn, message, model=False, trigger_mode="always_last")
+    look: dict[str, Any] = {"message": message, "stage": NAME, "doing": DOING, "trigger_mode": "always_last"}
+    attach(plot.pick, do.pick, [], shown, **look)
+    attach(card.act, do.act, [current], shown, **look)
+    arrival(door, do.arrive, [], [system, order, k, *drawn, *shown], message, room=NAME, stage=NAME, doing=DOING)
+    commits(NAME, {"system": system}, system.input)
     commits(NAME, {"order": order}, order.input)
+    commits(NAME, {"k": k}, k.release)
+    commits(NAME, {"code": current}, current.change)
+
+
+def _controls(services: Services, opening: View) -> tuple[gr.CheckboxGroup, gr.Radio, gr.Slider]:
+    """Systems (where there are several), order and k."""
+    names = shown_systems(services)
+    row = control(NAME, "k")
+    system = gr.CheckboxGroup(
+        [(row_of(name).title, name) for name in names], value=[opening.controls.get("system")] if names else [],
+        label="Systems", elem_id="codebooks-system", visible=len(names) > 1,
+    )  # fmt: skip
+    with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):
+        order = gr.Radio(
+            ORDERS, value="sorted", label=control(NAME, "order").label, elem_id="codebooks-order",
+            elem_classes=["mtp-segments"], min_width=0,
+        )  # fmt: skip
+        k = gr.Slider(
+            row.low, row.high, value=row.default, step=1, label=row.label, elem_id="codebooks-k", min_width=80
+        )
+    return system, order, k
