@@ -55,7 +55,15 @@
     find('[data-do="close"]').addEventListener('click', () => dialog.close());
     dialog.addEventListener('click', (event) => event.target === dialog && dialog.close());
 
-    more.addEventListener('click', () => more.setAttribute('aria-expanded', String(header.classList.toggle('is-open'))));
+    // On a phone the tools are a menu under "⋯", which closes behind a choice.
+    const unfold = (open) => {
+      header.classList.toggle('is-open', open);
+      more.setAttribute('aria-expanded', String(open));
+    };
+    more.addEventListener('click', () => unfold(!header.classList.contains('is-open')));
+    find('.mtp-tools').addEventListener('click', () => unfold(false));
+    document.addEventListener('pointerdown', (event) => element.contains(event.target) || unfold(false));
+    document.addEventListener('keydown', (event) => event.key === 'Escape' && unfold(false));
     window.mtpHeader(element);
     window.mtpExport.mount(header, part('export'));
     window.mtpSay = say;

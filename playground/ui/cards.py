@@ -101,18 +101,22 @@ def card_html(shown: Card, level: int = 3, inside: bool = False) -> str:
     parts.append(_paragraphs(shown.idea, "In one sentence. " if inside else ""))
     if shown.equation:
         parts.append(f'<div class="mtp-equation">{equation_html(shown.equation)}</div>')
-        parts.append(f'<p class="mtp-reading">{_inline(shown.reading)}</p>')
+        parts.append(f'<p class="mtp-reading">{_SYMBOL.sub(_symbol, _inline(shown.reading))}</p>')
     for question, answer in shown.questions:
         parts.append(f"<details><summary>{_inline(question)}</summary>{_paragraphs(answer)}</details>")
-    facts = [("In Python", f"<code>{html.escape(shown.call)}</code>")] if shown.call else []
-    facts += [("In the paper", html.escape(shown.paper))] if shown.paper else []
-    if facts:
-        rows = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in facts)
-        parts.append(f'<dl class="mtp-sources">{rows}</dl>')
+    return f'<div class="mtp-card"><div>{"".join(parts)}</div><div>{_sources(shown, inside)}</div></div>'
+
+
+def _sources(shown: Card, inside: bool) -> str:
+    """What stands beside a card: the call, the paper, the link."""
+    calls = "".join(f"<code>{html.escape(call)}</code>" for call in shown.call.split("; ")) if shown.call else ""
+    rows = [("In Python", calls), ("In the paper", html.escape(shown.paper))]
+    facts = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in rows if value)
+    link = ""
     if shown.link and not inside:
         address = query(parse(shown.link)) or "?room=tokenize"
-        parts.append(f'<p class="mtp-try"><a data-state href="{html.escape(address, quote=True)}">Try it</a></p>')
-    return f'<div class="mtp-card">{"".join(parts)}</div>'
+        link = f'<p class="mtp-try"><a data-state href="{html.escape(address, quote=True)}">Try it</a></p>'
+    return f'<dl class="mtp-sources">{facts}</dl>{link}'
 
 
 def equation_html(text: str) -> str:
@@ -127,7 +131,12 @@ def term_html(name: str, words: str = "") -> str:
     return f'<span class="mtp-term" tabindex="0" data-card="{html.escape(term(name), quote=True)}">{shown}</span>'
 
 
+_SYMBOL = re.compile(r"([A-Za-zẑφ])_(\{[^}]*\}|[A-Za-z0-9])")  # a letter with something low, in running text
 _LOW_HIGH = re.compile(r"([_^])(\{[^}]*\}|[A-Za-z0-9−]+)")
+
+
+def _symbol(match: re.Match[str]) -> str:
+    return f"<i>{match[1]}</i><sub>{_formula(match[2].strip('{}'))}</sub>"
 
 
 def _formula(text: str) -> str:

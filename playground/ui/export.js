@@ -138,9 +138,14 @@
     server[call](wished);
   }
 
+  // A button that is switched off loses the focus; it gets it back.
+  let pressed = null;
   function busy(on) {
+    if (on && !panel.classList.contains('is-busy')) pressed = document.activeElement;
     panel.classList.toggle('is-busy', on);
     for (const node of panel.querySelectorAll('.mtp-export-row :is(button, select)')) node.disabled = on;
+    const lost = [null, document.body, panel.querySelector('.mtp-export-stop')].includes(document.activeElement);
+    if (!on && lost && !panel.hidden) pressed?.focus();
   }
 
   function tell(text, share = null) {
@@ -163,8 +168,13 @@
 
   function fill() {
     const rows = [...rowsOfStage(mtpState.stage()), ...rowsOfCharts(mtpState.panel)];
+    const chosen = new Map([...panel.querySelectorAll('select')].map((node) => [node.ariaLabel, node.value]));
     const none = make('p', {}, 'There is nothing to export here yet.');
     panel.querySelector('.mtp-export-rows').replaceChildren(...(rows.length ? rows : [none]));
+    for (const node of panel.querySelectorAll('select')) {
+      const before = chosen.get(node.ariaLabel);
+      if ([...node.options].some(({ value }) => value === before)) node.value = before;
+    }
     if (!panel.classList.contains('is-busy')) tell('');
     else busy(true);
   }
@@ -180,7 +190,7 @@
     if (panel.hidden) return;
     panel.hidden = true;
     button.setAttribute('aria-expanded', 'false');
-    if (back) button.focus();
+    if (back) (button.getClientRects().length ? button : document.querySelector('.mtp-more'))?.focus();
   }
 
   function mount(header, opener) {
@@ -192,7 +202,7 @@
     );
     header.append(panel);
     button.addEventListener('click', () => (panel.hidden ? open() : close()));
-    panel.addEventListener('keydown', (event) => event.key === 'Escape' && close());
+    document.addEventListener('keydown', (event) => event.key === 'Escape' && close());
     document.addEventListener('pointerdown', (event) => {
       if (!panel.contains(event.target) && !button.contains(event.target)) close(false);
     });

@@ -104,32 +104,33 @@
     skip.hidden = at === steps.length - 1;
     const asked = new URLSearchParams(step.query).get('room');
     if (mtpState.room !== asked) mtpState.enter(asked);
-    let tries = 40;
-    const find = () => {
-      if (!parts || steps[at] !== step) return;
-      const target = targetOf(step);
-      if (target) target.scrollIntoView({ block: 'center', behavior: calm() ? 'auto' : 'smooth' });
-      place();
-      if (!target && tries--) setTimeout(find, 50);
-    };
-    find();
+    requestAnimationFrame(() => parts && reveal());
     next.focus({ preventScroll: true });
+  }
+
+  // A room that is opened for the first time grows for a moment; the page scrolls, figures change size.
+  const growing = new ResizeObserver(() => parts && reveal());
+  const reveal = () => targetOf(steps[at])?.scrollIntoView({ block: 'center', behavior: 'auto' });
+
+  function follow() {
+    if (!parts) return;
+    place();
+    requestAnimationFrame(follow);
   }
 
   function start() {
     if (parts) return;
     opener = document.activeElement;
     parts = build();
-    window.addEventListener('resize', place);
-    document.addEventListener('scroll', place, { capture: true, passive: true });
     document.addEventListener('keydown', keys, true);
+    growing.observe(document.body);
     go(0);
+    follow();
   }
 
   function end() {
-    window.removeEventListener('resize', place);
-    document.removeEventListener('scroll', place, { capture: true });
     document.removeEventListener('keydown', keys, true);
+    growing.disconnect();
     parts.ring.remove();
     parts.box.remove();
     parts = null;

@@ -102,7 +102,16 @@
     room = name;
     if ([...values.keys()].some((key) => key !== 'selection')) knock(name, asked);
     else settled(name);
-    whenThere(() => tabOf(name), (tab) => tab.getAttribute('aria-selected') === 'true' || tab.click());
+    enter(name);
+  }
+
+  // Opens a room by its tab; a page that is still waking up, or in the middle of another tab, may need to be told twice.
+  function enter(name, tries = 20) {
+    whenThere(() => tabOf(name), (tab) => {
+      if (room !== name || tab.getAttribute('aria-selected') === 'true') return;
+      tab.click();
+      if (tries) setTimeout(() => enter(name, tries - 1), 150);
+    });
   }
 
   // A link inside the page: the same as opening its address, without leaving.
@@ -165,7 +174,11 @@
 
   window.mtpState = {
     door, keep, settled, open, query,
-    enter: (name) => tabOf(name)?.click(),
+    enter: (name) => {
+      room = name;
+      write();
+      enter(name);
+    },
     get room() { return room; },
     get panel() { return panelOf(room); },
     stage: () => stageOf(room),

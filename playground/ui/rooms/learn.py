@@ -30,8 +30,8 @@ def page() -> str:
         '<div class="mtp-learn"><nav aria-label="Cards"><h2>Learn</h2>'
         f'<p>{LEAD}</p><button type="button" class="mtp-start" data-do="tour">Take the tour</button>{contents}'
         '<ul><li><a href="#learn-words">Words</a></li></ul></nav>'
-        f'<div class="mtp-cards">{articles}<article id="learn-words"><div class="mtp-card"><h3>Words</h3>'
-        f'<dl class="mtp-glossary">{words}</dl></div></article></div></div>'
+        f'<div class="mtp-cards">{articles}<article id="learn-words"><div class="mtp-card"><div><h3>Words</h3>'
+        f'<dl class="mtp-glossary">{words}</dl></div></div></article></div></div>'
     )
 
 
