@@ -49,8 +49,8 @@ def embedding_maps(
             hover = [notes[i] if notes else group for i in chosen]
             names = [ids[i] for i in chosen]
             figure.add_trace(_cloud(group, points[chosen], names, hover, column == 1), 1, column)
-        _name_groups(figure, points, actions, column)
-        _axes(figure, points, (explained or {}).get(name), column)
+        name_groups(figure, points, actions, column)
+        equal_axes(figure, points, (explained or {}).get(name), column)
     figure.update_layout(legend={"x": 1.01, "y": 1, "yanchor": "top", "tracegroupgap": 0})
     left, lines = (56, 1) if explained else (16, 0)
     return finish(
@@ -77,7 +77,7 @@ def _cloud(group: str, points: NDArray[np.float64], ids: list[str], hover: list[
     )  # fmt: skip
 
 
-def _name_groups(figure: go.Figure, points: NDArray[np.float64], actions: Sequence[str], column: int) -> None:
+def name_groups(figure: go.Figure, points: NDArray[np.float64], actions: Sequence[str], column: int) -> None:
     """Writes the name of every large group above its densest place, names pushed apart where they would meet."""
     n = len(points)
     if n < 10:
@@ -115,7 +115,7 @@ def _apart(places: list[tuple[str, NDArray[np.float64]]]) -> list[tuple[str, NDA
     return moved
 
 
-def _axes(figure: go.Figure, points: NDArray[np.float64], explained: ArrayLike | None, column: int) -> None:
+def equal_axes(figure: go.Figure, points: NDArray[np.float64], explained: ArrayLike | None, column: int) -> None:
     """Equal units on both axes; scales and titles for PCA alone."""
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     half = max(float(np.ptp(points, axis=0).max()) / 2 * 1.06, 1e-6)

@@ -4,6 +4,8 @@
  * meta.dark = {"marker.color": ...} with what changes in the dark; every other colour comes from the --mtp tokens.
  * A click on a point that has customdata triggers 'pick' and rings that point in every panel of the chart; the figure's
  * layout.meta.picked names the point that is ringed at first; an event 'mtp-pick' {chart: element id, id} rings another.
+ * An event 'mtp-lasso' {chart, group} lets a drag draw a group of that name ('' ends it): its points are outlined, and
+ * 'lasso' is triggered with {group, ids}; with {chart, forget: true} the groups are gone.
  */
 (() => {
   if (window.mtpChart) return;
@@ -75,9 +77,20 @@
     });
   }
 
+  // Outlines round the points of each group; the first one round, the second one square.
+  function outlines(data, groups) {
+    return [...groups].flatMap(([group, ids], place) => data.filter(({ customdata }) => Array.isArray(customdata)).map((trace) => {
+      const at = trace.customdata.flatMap((entry, i) => (ids.has(first(entry)) ? [i] : []));
+      return { type: 'scatter', mode: 'markers', name: group, x: at.map((i) => trace.x[i]), y: at.map((i) => trace.y[i]),
+               xaxis: trace.xaxis, yaxis: trace.yaxis, hoverinfo: 'skip', showlegend: false,
+               marker: { size: 11, symbol: place ? 'square-open' : 'circle-open', color: token('text'), line: { width: 1.2 } } };
+    }));
+  }
+
   window.mtpChart = (element, props, trigger, watch) => {
     const box = element.querySelector('.mtp-chart');
-    let picked = null;
+    let picked = null, group = '';
+    const groups = new Map(); // name -> Set of ids
 
     async function draw() {
       if (!props.value || !box.isConnected || box.clientWidth === 0) return;
@@ -87,7 +100,10 @@
       const figure = JSON.parse(text);
       const { data, layout } = dress(figure);
       const ringed = picked ?? figure.layout?.meta?.picked;
+      const told = outlines(data, groups);
       if (ringed !== undefined && ringed !== null) data.push(...rings(data, String(ringed)));
+      data.push(...told);
+      if (group) layout.dragmode = 'lasso';
       layout.height = box.clientHeight || undefined;
       await Plotly.react(box, data, layout, { displayModeBar: false, responsive: true, doubleClick: 'reset' });
       box.dataset.drawn = String(Number(box.dataset.drawn || 0) + 1);
@@ -101,6 +117,13 @@
           trigger('pick', { id: picked });
           redraw();
         });
+        box.on('plotly_selected', (event) => {
+          const hits = (event?.points ?? []).filter(({ customdata }) => customdata !== undefined && customdata !== null);
+          if (!group || !hits.length) return;
+          groups.set(group, new Set(hits.map(({ customdata }) => first(customdata))));
+          trigger('lasso', { group, ids: [...groups.get(group)] });
+          redraw();
+        });
       }
     }
 
@@ -109,6 +132,12 @@
     document.addEventListener('mtp-pick', (event) => {
       if (!element.closest(`#${CSS.escape(event.detail.chart)}`)) return;
       picked = event.detail.id;
+      redraw();
+    });
+    document.addEventListener('mtp-lasso', (event) => {
+      if (!element.closest(`#${CSS.escape(event.detail.chart)}`)) return;
+      group = event.detail.group ?? group;
+      if (event.detail.forget) groups.clear();
       redraw();
     });
     let width = 0; // the observer also speaks once at the start, and when a hidden tab is opened

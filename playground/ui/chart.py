@@ -16,7 +16,7 @@ _TEMPLATE = """
 """
 _START = """
 const start = () => window.mtpChart ? window.mtpChart(element, props, trigger, watch) : requestAnimationFrame(start);
-start();  // triggers 'pick' with {id} when a point is clicked
+start();  // triggers 'pick' with {id} at a click on a point, 'lasso' with {group, ids} when points are drawn round
 """
 
 
@@ -46,7 +46,8 @@ def chart(
 
     label is read out to people who do not see the chart, and stands above it with show_label; height in pixels.
     Where the page is narrower than `narrowest` pixels, the chart scrolls sideways inside itself.
-    `chart.pick(handler)` is called with event data whose `id` is the customdata of the clicked point.
+    `chart.pick(handler)` is called with event data whose `id` is the customdata of the clicked point;
+    `chart.lasso(handler)` with the `group` that the page draws (chart.js, 'mtp-lasso') and the `ids` in it.
     """
     return gr.HTML(
         value=value,

@@ -125,7 +125,20 @@ def _embedding_map(state: State) -> tuple[str, str]:
         "tokens = bundle.token_file(row)\nmotion = default_engine().decode(tokens).motion\n"
         + _TOKENS.format(name="tokens")
         + 'print("t-SNE:", *bundle.tsne[row], " PCA:", *bundle.pca[row])\n'
-        'print(f"{motion.frames} frames of: {tokens.caption}")\n'
+        'print(f"{motion.frames} frames of: {tokens.caption}")\n' + _placed(state)
+    )
+
+
+def _placed(state: State) -> str:
+    """A new point on the maps, where one was placed."""
+    if not state["place"]:
+        return ""
+    return (
+        "\nengine = default_engine()\n"
+        f"(example,) = [one for one in engine.examples() if one.id == {_literal(state['place'])}]\n"
+        f"new = engine.tokenize(example.motion().slice(0, {LIMITS.max_frames + 1}), example.caption, "
+        f"system={_literal(state.system)})\nplaced = engine.place(new)\n"
+        'print("placed at t-SNE", *placed.tsne, " PCA", *placed.pca, " nearest:", *placed.nearest[:4])\n'
     )
 
 

@@ -211,7 +211,7 @@ def test_the_guidance_slider_moves_the_figure_and_asks_nobody(seen: Visit) -> No
     assert seen.sent_since(mark) == []
 
 
-def test_a_click_on_the_map_puts_that_motion_on_the_stage(seen: Visit) -> None:
+def test_a_click_on_the_areaputs_that_motion_on_the_stage(seen: Visit) -> None:
     page = seen.enter("Embedding map")
     points = page.locator("#embedding-map .scatterlayer .trace .point")
     expect(points.first).to_be_visible()
@@ -286,3 +286,56 @@ def test_a_click_on_a_curve_shows_what_the_code_stands_for(seen: Visit) -> None:
     expect(page).to_have_url(re.compile(r"code=lgtok-lite\.5\.\d+"))
     page.reload()
     expect(page.locator("#codebooks-card")).to_contain_text("scale 5")
+
+
+def test_maps_of_tokens_by_scale(seen: Visit) -> None:
+    page = seen.enter("Embedding map")
+    points = page.locator("#embedding-map .scatterlayer .trace .point")
+    expect(points).to_have_count(182)  # 90 clips on two maps, and two rings
+    page.get_by_role("radio", name="one point a token").check()
+    expect(points).to_have_count(400)
+    page.locator("#embedding-colour input").click()
+    page.get_by_role("option", name="scale").click()
+    expect(page.locator("#embedding-map")).to_contain_text("scale, coarse to fine")
+    expect(page).to_have_url(re.compile("each=token&colour=scale"))
+    expect(page.locator("#embedding-map")).to_contain_text("seed 0")
+
+
+def test_a_lasso_compares_a_group_with_the_rest(seen: Visit) -> None:
+    page = seen.enter("Embedding map")
+    expect(page.locator("#embedding-map .scatterlayer .trace .point")).to_have_count(
+        182
+    )  # 90 clips on two maps, and two rings
+    page.get_by_role("button", name="Compare two groups").click()
+    page.get_by_role("radio", name="draws group A").check()
+    page.wait_for_function("() => document.querySelector('#embedding-map .mtp-chart')._fullLayout.dragmode === 'lasso'")
+    area = page.locator("#embedding-map .draglayer .xy .nsewdrag")
+    area.scroll_into_view_if_needed()
+    place = area.bounding_box()
+    assert place is not None
+    corners = [(0.02, 0.02), (0.98, 0.02), (0.98, 0.5), (0.02, 0.5), (0.02, 0.04)]
+    for n, (x, y) in enumerate(corners):
+        page.mouse.move(place["x"] + x * place["width"], place["y"] + y * place["height"], steps=4)
+        if n == 0:
+            page.mouse.down()
+    page.mouse.up()
+    expect(page.locator("#embedding-groups tbody tr").last).to_contain_text("all")
+    expect(page.locator("#embedding-groups")).to_contain_text("from A to the rest")
+    counts = page.locator("#embedding-groups tbody tr").last.locator("td").all_inner_texts()
+    assert sum(map(int, counts)) == 90 and 0 < int(counts[0]) < 90
+    page.get_by_role("button", name="Forget groups").click()
+    expect(page.locator("#embedding-groups tbody tr")).to_have_count(0)
+
+
+def test_an_example_is_placed_and_coordinates_are_saved(seen: Visit) -> None:
+    page = seen.enter("Embedding map")
+    page.get_by_role("button", name="Place a motion of your own").click()
+    choose(page, "embedding-place", 1)
+    expect(page.locator("#embedding-stage .ms-labels")).to_contain_text("placed in the map")
+    expect(page.locator("#embedding-map .legend")).to_contain_text("yours")
+    expect(page.locator("#embedding-near input[type=radio]")).to_have_count(3)
+    expect(page).to_have_url(re.compile("place=m1"))
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Coordinates (CSV)").click()
+    lines = Path(saved.value.path()).read_text().splitlines()
+    assert len(lines) == 91 and lines[0].startswith("system,id,scale")

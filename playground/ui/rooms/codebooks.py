@@ -227,7 +227,7 @@ def _controls(services: Services, opening: View) -> tuple[gr.CheckboxGroup, gr.R
     names = shown_systems(services)
     row = control(NAME, "k")
     system = gr.CheckboxGroup(
-        [(row_of(name).title, name) for name in names], value=[opening.controls.get("system")] if names else [],
+        [(row_of(name).title, name) for name in names], value=[str(opening.controls.get("system"))] if names else [],
         label="Systems", elem_id="codebooks-system", visible=len(names) > 1,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):

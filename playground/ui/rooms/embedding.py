@@ -1,42 +1,49 @@
-"""Room 2: where motions lie when tokens are read as vectors; a click puts a motion on the stage."""
+"""Room 2: where motions lie when tokens are read as vectors; a click puts one on the stage, a lasso compares groups."""
 
-import html
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import gradio as gr
 import numpy as np
 
-from playground.analysis.bundle import DECODED_NOTE, Bundle
+from playground.analysis.bundle import DECODED_NOTE, Bundle, stored_systems
 from playground.errors import PlaygroundError
-from playground.figures.embedding import embedding_maps
-from playground.figures.theme import percent
+from playground.figures import stage as scene
+from playground.limits import LIMITS
 from playground.ui.cards import term
-from playground.ui.chart import chart
-from playground.ui.errors import attach, message_place
+from playground.ui.errors import attach
 from playground.ui.facts import Fact
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
-from playground.ui.scenes import clip_scene, token_facts
+from playground.ui.mapping import COLOURS, Shown, about, compare, coordinates, label_of, maps
+from playground.ui.mapviews import FORGET, FREE, KEEP_GROUP, RING, SAVE, SELECT, Views, panel_views
+from playground.ui.placing import Guest, generated_guest, guest_of, guest_scene
+from playground.ui.scenes import score, token_facts
 from playground.ui.services import Services
+from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
-
-if TYPE_CHECKING:
-    from playground.engine import SystemInfo
 
 NAME = "embedding-map"
 STAGE = "embedding"
-LEAD = (
-    "Each point is one recorded motion, placed by what its tokens mean to the decoder. Click one and it steps on the "
-    "stage. Do its neighbours move alike?"
-)
-HEIGHT = 420
+LEAD = "Each point is a recorded motion, placed by what its tokens mean. Click one: do neighbours move alike?"
 NEIGHBOURS = 4
-DOING = "Decoding its tokens"
-RING = """(id) => {
-  document.dispatchEvent(new CustomEvent('mtp-pick', { detail: { chart: 'embedding-map', id } }));
-  return id;
-}"""
+DOING, PLACING = "Decoding its tokens", "Placing it"
+
+
+@dataclass
+class Session:
+    """What one visitor looks at."""
+
+    guest: Guest | None = None
+    groups: dict[str, list[str]] = field(default_factory=dict)  # "A", "B" -> ids of points
+
+
+def map_systems(services: Services) -> list[str]:
+    """The systems whose maps are stored and whose checkpoint is here."""
+    stored = stored_systems(services.engine().assets / "analysis")
+    return [system.name for system in services.shipped() if system.name in stored]
 
 
 def first_clip(bundle: Bundle) -> int:
@@ -54,122 +61,206 @@ def neighbours(bundle: Bundle, row: int, count: int = NEIGHBOURS) -> list[int]:
     return [int(other) for other in np.argsort(distance, kind="stable")[: min(count, len(bundle) - 1)]]
 
 
-def label_of(bundle: Bundle, row: int) -> str:
-    """A clip in a few words: our caption and where it was recorded."""
-    clip = bundle.clips[row]
-    return f"{clip.caption or clip.action} ({clip.source})"
-
-
-def maps(bundle: Bundle, picked: str) -> str:
-    """Both maps as Plotly JSON text, the clip `picked` ringed; the legend stands below, to leave the maps the width."""
-    shadow = f"PCA, {percent(sum(bundle.explained))} of the variance"
-    figure = embedding_maps(
-        {f"t-SNE, perplexity {bundle.perplexity:g}": bundle.tsne, shadow: bundle.pca},
-        bundle.actions,
-        bundle.ids,
-        notes=[f"{clip.action}<br>{label_of(bundle, row)}" for row, clip in enumerate(bundle.clips)],
-        height=HEIGHT,
-    )
-    figure.update_layout(
-        meta={"picked": picked},
-        margin={"l": 8, "r": 8, "t": 28, "b": 64},
-        legend={"orientation": "h", "x": 0, "y": -0.03, "xanchor": "left", "yanchor": "top"},
-    )
-    return str(figure.to_json())
-
-
-def show(services: Services, system: "SystemInfo", bundle: Bundle, row: int) -> View:
-    """Decode a clip of the bundle from its tokens and put it on the stage."""
+def show(services: Services, systems: Sequence[str], wanted: str) -> View:
+    """A clip of the maps, decoded from its tokens by every system shown that has it, on the stage."""
     began = time.perf_counter()
-    decoded = services.engine().decode(bundle.token_file(row))
-    clip, levels = bundle.clips[row], bundle.levels(row)
-    palettes = services.palettes(system.name)
+    infos = {one.name: one for one in services.engine().systems()}
+    figures: list[Any] = []
+    tracks: list[Any] = []
+    for name in systems:
+        bundle = services.bundle(name)
+        if wanted not in bundle.ids:
+            continue
+        row = bundle.position(wanted)
+        decoded, levels = services.engine().decode(bundle.token_file(row)), bundle.levels(row)
+        label = label_of(bundle, row)
+        title = label[:1].upper() + label[1:] if not figures else infos[name].title
+        figures.append(scene.figure(f"clip-{name}", title, decoded.motion.joints, name, DECODED_NOTE))
+        tracks.append(score(infos[name], decoded.motion.frames, levels, services.palettes(name)))
+    first = services.bundle(systems[0])
+    row = first.position(wanted)
     return View(
-        stage=clip_scene(system, decoded.motion, levels, palettes, label_of(bundle, row), DECODED_NOTE),
-        facts=(Fact(f"{bundle.errors_mm[row]:.0f} mm", "MPJPE", term("clip error")), *token_facts(levels)),
-        controls={"id": clip.id, "label": label_of(bundle, row), "near": _near(bundle, row)},
+        stage=scene.payload(figures[: LIMITS.max_figures], tracks, scene=wanted),
+        facts=(Fact(f"{first.errors_mm[row]:.0f} mm", "MPJPE", term("clip error")), *token_facts(first.levels(row))),
+        controls={"id": wanted, "near": _listed(first, neighbours(first, row))},
         seconds=time.perf_counter() - began,
     )
 
 
 def opening_view(services: Services) -> View:
     """The room's first result, maps included."""
-    system = services.default_system()
-    bundle = services.bundle(system.name)
-    row = first_clip(bundle)
-    view = show(services, system, bundle, row)
-    view.charts["maps"] = maps(bundle, bundle.clips[row].id)
-    view.controls["about"] = about(bundle)
+    first = services.default_system().name
+    bundle = services.bundle(first)
+    view = show(services, [first], bundle.clips[first_clip(bundle)].id)
+    view.charts["maps"] = maps([bundle], Shown((first,)), view.controls["id"])
+    view.controls.update(about=about(bundle), system=first)
     return view
 
 
-def about(bundle: Bundle) -> str:
-    """What the maps show and how far to trust them, as a line of HTML."""
-    share, chance = percent(bundle.agreement), percent(bundle.chance)
-    shared = f"{share} of the ten nearest neighbours share a clip's action, {chance} by chance"
-    return f'<p class="mtp-aside">{html.escape(f"{bundle.provenance}. {shared}.")}</p>'
-
-
 class Handlers:
-    """What a click on the map and a choice among the neighbours do."""
+    """What the room's controls do. `shown` of the room: stage, facts, neighbours and the id of the point."""
 
     def __init__(self, services: Services) -> None:
         self.services = services
 
-    def put(self, wanted: object) -> tuple[Any, ...]:
-        """The clip of that id on the stage, its numbers, its neighbours."""
-        system = self.services.default_system()
-        bundle = self.services.bundle(system.name)
-        view = show(self.services, system, bundle, bundle.position(str(wanted)))
-        near = gr.update(choices=view.controls["near"], value=None)
-        return view.stage_json(), view.facts_html(), near, view.controls["id"]
+    def draw(
+        self, systems: Sequence[str], each: str, colour: str, kind: str, current: str, held: Session | None
+    ) -> tuple[Any, ...]:
+        """The maps again, the choice of colours, the groups and what is told of the maps."""
+        held = held or Session()
+        shown, bundles = self._shown(systems, each, colour, kind)
+        held = replace(held, groups={})
+        choices = gr.update(choices=COLOURS[shown.each], value=shown.colour)
+        return held, self._maps(held, shown, bundles, current), choices, "", about(bundles[0])
 
-    def click(self, event: gr.EventData) -> tuple[Any, ...]:
+    def put(self, wanted: object, systems: Sequence[str]) -> tuple[Any, ...]:
+        """A point by its id (for a token "clip/scale/position"): its clip on the stage, its numbers, its neighbours."""
+        text = str(wanted)
+        view = show(self.services, self._known(systems), text.split("/")[0])
+        near = gr.update(choices=view.controls["near"], value=None, label=NEAR)
+        return view.stage_json(), view.facts_html(), near, text
+
+    def click(self, systems: Sequence[str], event: gr.EventData) -> tuple[Any, ...]:
         """A point of a map."""
-        return self.put(event.id)
+        return self.put(event.id, systems)
 
-    def arrive(self, event: gr.EventData) -> tuple[Any, ...]:
-        """The clip that a link asks for, or the one that the room opens with."""
-        bundle, wanted = self.services.bundle(self.services.default_system().name), asked(event)["motion"]
-        return self.put(wanted if wanted in bundle.ids else bundle.clips[first_clip(bundle)].id)
-
-    def step(self, wanted: str | None) -> tuple[Any, ...]:
+    def step(self, wanted: str | None, systems: Sequence[str]) -> tuple[Any, ...]:
         """One of the neighbours."""
         if wanted is None:
             raise PlaygroundError("choose one of the neighbours")
-        return self.put(wanted)
+        return self.put(wanted, systems)
+
+    def lasso(self, systems: Sequence[str], each: str, held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
+        """A group that was drawn round points."""
+        held = held or Session()
+        if event.group not in ("A", "B") or not isinstance(event.ids, list):
+            raise PlaygroundError("draw round some points to make a group")
+        groups = {**held.groups, event.group: [str(id) for id in event.ids[:100_000]]}
+        held = replace(held, groups=groups)
+        bundle = self.services.bundle(self._known(systems)[0])
+        return held, compare(bundle, each, groups.get("A", []), groups.get("B", []))
+
+    def forget(self, held: Session | None) -> tuple[Any, ...]:
+        """No groups any more."""
+        return replace(held or Session(), groups={}), "", "off"
+
+    def place_example(self, wanted: str, *rest: Any) -> tuple[Any, ...]:
+        """An example as a new point."""
+        found = self.services.example(wanted)
+        source = Source(found.motion(), found.title)
+        return self._place(lambda system: guest_of(self.services, source, found.caption, system), *rest)
+
+    def place_upload(self, path: str | None, *rest: Any) -> tuple[Any, ...]:
+        """A file of the visitor's own as a new point."""
+        source = read_upload(path)
+        return self._place(lambda system: guest_of(self.services, source, source.caption, system), *rest)
+
+    def place_prompt(self, prompt: str, *rest: Any) -> tuple[Any, ...]:
+        """A generation as a new point."""
+        return self._place(lambda system: generated_guest(self.services, prompt, system), *rest)
+
+    def _place(
+        self, make: Any, systems: Sequence[str], each: str, colour: str, kind: str, current: str, held: Session | None
+    ) -> tuple[Any, ...]:
+        shown, bundles = self._shown(systems, each, colour, kind)
+        guest: Guest = make(shown.systems[0])
+        placed = guest.on(self.services, shown.systems, "clip")
+        held = replace(held or Session(), guest=guest)
+        first, bundle = placed[shown.systems[0]], bundles[0]
+        view = View(
+            guest_scene(self.services, guest, shown.systems), token_facts(guest.results[shown.systems[0]].levels),
+            seconds=first.seconds,
+        )  # fmt: skip
+        rows = [bundle.position(id) for id in first.nearest if id in bundle.ids][:NEIGHBOURS]
+        near = gr.update(
+            choices=_listed(bundle, rows), value=None, label=f"Nearest in all dimensions to: {guest.title}"
+        )
+        return held, self._maps(held, shown, bundles, ""), view.stage_json(), view.facts_html(), near
+
+    def csv(self, systems: Sequence[str], each: str) -> tuple[Any, ...]:
+        """All coordinates as CSV text."""
+        return (coordinates([self.services.bundle(name) for name in self._known(systems)], each),)
+
+    def arrive(self, held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
+        """What a link asks for."""
+        state = asked(event)
+        systems = [name for name in state["system"] or () if name in map_systems(self.services)]
+        systems = systems or [self.services.default_system().name]
+        bundle, wanted = self.services.bundle(systems[0]), state["motion"]
+        wanted = wanted if wanted in bundle.ids else bundle.clips[first_clip(bundle)].id
+        drawn = self.draw(systems, state["each"], state["colour"], state["map"], wanted, held)
+        kept = [systems, state["each"], state["map"], *drawn, *self.put(wanted, systems)]
+        known = {example.id for example in self.services.examples()}
+        if state["place"] not in known:
+            return tuple(kept)
+        settings = (systems, state["each"], state["colour"], state["map"], wanted, kept[3])
+        kept[3], kept[4], *kept[8:11] = self.place_example(state["place"], *settings)
+        return tuple(kept)
+
+    def _maps(self, held: Session, shown: Shown, bundles: list[Bundle], current: str) -> str:
+        placed = held.guest.on(self.services, shown.systems, shown.each) if held.guest else {}
+        return maps(bundles, shown, current, placed)
+
+    def _known(self, systems: Sequence[str]) -> list[str]:
+        known = [name for name in map_systems(self.services) if name in systems]
+        if not known:
+            raise PlaygroundError("choose at least one of the systems whose maps are stored")
+        return known
+
+    def _shown(self, systems: Sequence[str], each: str, colour: str, kind: str) -> tuple[Shown, list[Bundle]]:
+        shown = Shown(tuple(self._known(systems)), str(each), str(colour), str(kind)).checked()
+        return shown, [self.services.bundle(name) for name in shown.systems]
+
+
+NEAR = "Its nearest neighbours, in all dimensions; choose one to go there"
 
 
 def room(services: Services) -> None:
     """Build the room inside the current tab."""
     opening = services.first_view(NAME, opening_view)
+    session = gr.State(Session(), time_to_live=LIMITS.session_seconds)
     with room_frame(STAGE):
         stage = stage_and_score(STAGE, opening)
         with panel("A map of motions", LEAD):
-            plot = chart(
-                opening.charts.get("maps"), label="Two maps of the same motions", height=HEIGHT, elem_id="embedding-map"
-            )
-            message = message_place("embedding-message")
-            facts = gr.HTML(opening.facts_html(), elem_id="embedding-facts", apply_default_css=False)
-            near = gr.Radio(
-                opening.controls.get("near", []),
-                value=None,
-                label="Its nearest neighbours, in all dimensions; choose one to go there",
-                elem_id="embedding-near",
-            )
-            gr.HTML(opening.controls.get("about", ""), elem_id="embedding-about", apply_default_css=False)
+            views = panel_views(services, map_systems(services), opening, NEAR)
         words(NAME)
-        current = gr.Textbox(opening.controls.get("id"), visible="hidden", elem_id="embedding-current")
         door = link_door(NAME)
-    do = Handlers(services)
-    shown = [stage, facts, near, current]
-    attach(plot.pick, do.click, [], shown, message, stage=STAGE, doing=DOING, trigger_mode="always_last")
-    current.change(None, [current], None, js=RING, api_visibility="private")
-    commits(NAME, {"motion": current}, current.change, forget=("selection",))
-    arrival(door, do.arrive, [], shown, message, room=NAME, stage=STAGE, doing=DOING)
-    attach(near.input, do.step, [near], shown, message, stage=STAGE, doing=DOING)
+    _bind(Handlers(services), views, session, stage, door)
 
 
-def _near(bundle: Bundle, row: int) -> list[tuple[str, str]]:
-    rows = neighbours(bundle, row)
-    return [(bundle.clips[other].caption or bundle.clips[other].action, bundle.clips[other].id) for other in rows]
+def _bind(do: Handlers, views: Views, session: gr.State, stage: gr.HTML, door: gr.HTML) -> None:
+    how: dict[str, Any] = {"message": views.message}
+    settings = [views.system, views.each, views.colour, views.map, views.current, session]
+    drawn = [session, views.plot, views.colour, views.groups, views.about]
+    shown = [stage, views.facts, views.near, views.current]
+    for event in (views.system.input, views.each.input, views.colour.input, views.map.input):
+        attach(event, do.draw, settings, drawn, **how)
+        event(None, None, None, js=FORGET, api_visibility="private")
+    busy: dict[str, Any] = {**how, "stage": STAGE, "doing": DOING}
+    clicked = attach(views.plot.pick, do.click, [views.system], shown, trigger_mode="always_last", **busy)
+    clicked.then(None, [views.current], None, js=SELECT, api_visibility="private")
+    attach(views.near.input, do.step, [views.near, views.system], shown, **busy)
+    views.current.change(None, [views.current], None, js=RING, api_visibility="private")
+    views.drag.input(None, [views.drag], None, js=KEEP_GROUP, api_visibility="private")
+    attach(views.plot.lasso, do.lasso, [views.system, views.each, session], [session, views.groups], model=False, **how)
+    attach(views.clear.click, do.forget, [session], [session, views.groups, views.drag], model=False, **how)
+    views.clear.click(None, None, None, js=FREE, api_visibility="private")
+    placed = [session, views.plot, stage, views.facts, views.near]
+    placing: dict[str, Any] = {**busy, "doing": PLACING}
+    attach(views.example.input, do.place_example, [views.example, *settings], placed, **placing)
+    attach(views.upload.upload, do.place_upload, [views.upload, *settings], placed, **placing)
+    for event in (views.go.click, views.prompt.submit):
+        attach(event, do.place_prompt, [views.prompt, *settings], placed, **placing)
+    saved = attach(views.csv.click, do.csv, [views.system, views.each], [views.text], model=False, **how)
+    saved.then(None, [views.text], None, js=SAVE, api_visibility="private")
+    arrival(door, do.arrive, [session], [views.system, views.each, views.map, *drawn, *shown], room=NAME, **busy)
+    commits(NAME, {"motion": views.current}, views.current.change, forget=("selection",))
+    commits(NAME, {"system": views.system}, views.system.input)
+    commits(NAME, {"each": views.each}, views.each.input)
+    commits(NAME, {"colour": views.colour}, views.colour.change)
+    commits(NAME, {"map": views.map}, views.map.input)
+    commits(NAME, {"place": views.example}, views.example.input, forget=("selection",))
+
+
+def _listed(bundle: Bundle, rows: Sequence[int]) -> list[tuple[str, str]]:
+    return [(bundle.clips[row].caption or bundle.clips[row].action, bundle.clips[row].id) for row in rows]
