@@ -96,7 +96,9 @@ def edit_strip(results: Results, kind: str) -> Picture | str:
         (f"before: {example['caption']}", unpacked(example["source"]), ORIGINAL.light),
         (f"drawn anew, {spans}: {example['prompt']}", unpacked(example["motion"]), system_color(result.system).light),
     )
-    return strip([Actor(name, joints.astype(np.float64), color) for name, joints, color in rows], result.line)
+    facts = result.provenance
+    note = f"{result.system}, checkpoint {facts['checkpoint'][:8]}, seed {example['seed']}; both motions are generated"
+    return strip([Actor(name, joints.astype(np.float64), color) for name, joints, color in rows], note)
 
 
 def prompt_strip(results: Results, prompt: str) -> Picture | str:

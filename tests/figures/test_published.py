@@ -208,8 +208,8 @@ def edits() -> Result:
     keys = (*editing.BORDERS, "kept_mm", "plain_error_mm", "gap_m", "gap_degrees")
     rows = [{"kind": kind} | {key: entry(1.0 + place) for place, key in enumerate(keys)} for kind in editing.KINDS]
     motion = packed(drifting(196))
-    example = {"kind": "inpaint", "caption": "before", "prompt": "after", "drawn": [[100, 160]], "source": motion,
-               "motion": motion}  # fmt: skip
+    example = {"kind": "inpaint", "caption": "before", "prompt": "after", "seed": 0, "drawn": [[100, 160]],
+               "source": motion, "motion": motion}  # fmt: skip
     return Result("edits", "", facts(LITE), rows, {"examples": [example]})
 
 
