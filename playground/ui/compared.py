@@ -35,7 +35,7 @@ def compared_view(services: Services, done: Sequence[Compared], source: Motion |
     take = min(take, len(done) - 1)
     return View(
         stage=_scene(services, done, source, name, take),
-        controls={"table": compared_table(services, done, source is not None, name)},
+        controls={"table": compared_table(services, done, source is not None, name, take)},
         seconds=sum(one.seconds for one in done),
     )
 
@@ -70,6 +70,7 @@ def _track(services: Services, one: Compared, first: Compared, several: bool) ->
     marks = None if same else [a.ids != b.ids for a, b in zip(one.levels, first.levels, strict=False)]
     if marks is not None and len(marks) < len(one.levels):
         marks += [np.zeros(level.size, bool) for level in one.levels[len(marks) :]]
+    marks = marks if marks is not None and any(mark.any() for mark in marks) else None
     sizes = services.scales(system.name)
     track = score(
         system, one.motion.frames, one.levels, services.palettes(system.name), sizes=sizes, marks=marks, marked=DIFFERS
@@ -79,15 +80,15 @@ def _track(services: Services, one: Compared, first: Compared, several: bool) ->
     return track
 
 
-def compared_table(services: Services, done: Sequence[Compared], rebuilt: bool, name: str) -> str:
-    """One row a setting, the best of each column marked where the settings differ in it."""
+def compared_table(services: Services, done: Sequence[Compared], rebuilt: bool, name: str, take: int) -> str:
+    """One row a setting, the best of each column marked where they differ; a name picks whose tokens are shown."""
     columns = (ERROR if rebuilt else OTHER, *COLUMNS)
     best = [None if not rebuilt and n == 0 else best_of(done, column) for n, column in enumerate(columns)]
     heads = "".join(f'<th scope="col">{head}</th>' for head, _, _ in columns)
     rows = ""
     for n, one in enumerate(done):
         cells = "".join(_cell(column, one, n in (best[k] or ())) for k, column in enumerate(columns))
-        rows += f'<tr><th scope="row">{html.escape(one.setting.name)}</th>{cells}</tr>'
+        rows += f'<tr><th scope="row">{_name(one, n, n == take)}</th>{cells}</tr>'
     told = measured_on(services, done[0].setting, rebuilt, name)
     return (
         '<div class="mtp-table-box"><table class="mtp-table mtp-compared"><thead><tr><th scope="col"></th>'
@@ -113,9 +114,15 @@ def measured_on(services: Services, setting: Setting, rebuilt: bool, name: str) 
     checkpoint = services.checkpoint(setting.system)[:8]
     system = f"{setting.system}, checkpoint {checkpoint}" if checkpoint else setting.system
     if rebuilt:
-        return f"This clip, {name}; {system}; time of tokenizing and decoding. Bold is best; less is better."
+        return f"This clip, {name}; {system}; time of tokenizing and decoding. Bold is best: the least."
     drawn = f"“{name}”, {setting.seconds:g} s, one motion each; {system}"
-    return f"{drawn}; time of drawing and decoding. Bold is best; less is better."
+    return f"{drawn}; time of drawing and decoding. Bold is best: the least."
+
+
+def _name(one: Compared, place: int, shown: bool) -> str:
+    title = "Its tokens are below" if shown else "Show its tokens below"
+    data = f'data-do="show" data-code="{place}" data-key="{place}" aria-pressed="{str(shown).lower()}"'
+    return f'<button type="button" {data} title="{title}">{html.escape(one.setting.name)}</button>'
 
 
 def _cell(column: Column, one: Compared, best: bool) -> str:

@@ -48,6 +48,7 @@ class Variation:
     choices: Choices
     usual: tuple[str, ...]
     apply: Callable[[Setting, str], Setting]
+    called: str = "{}"  # what one of them is called, from what the screen says of it
 
     @property
     def most(self) -> int:
@@ -55,13 +56,13 @@ class Variation:
         return LIMITS.max_figures - (self.of == MOTION)
 
 
-def _listed(unit: str, *values: str) -> Choices:
-    return lambda services: [(unit.format(value), value) for value in values]
+def _listed(*values: str) -> Choices:
+    return lambda services: [(value, value) for value in values]
 
 
 def _scales(services: Services) -> list[tuple[str, str]]:
     count = len(services.scales(services.default_system().name))
-    return [(f"{n} scale{'s' if n > 1 else ''}", str(n)) for n in range(1, count + 1)]
+    return [(str(n), str(n)) for n in range(1, count + 1)]
 
 
 def _systems(drawing: bool) -> Choices:
@@ -77,27 +78,32 @@ def _with_its_sampling(setting: Setting, system: str) -> Setting:
     return replace(setting, system=system, cfg=own.cfg, guidance=own.guidance, temperature=own.temperature)
 
 
-_WORDS = {"own": "its caption", "none": "no caption", "wrong": f"“{WRONG}”"}
+_WORDS = {"own": "Its caption", "none": "No caption", "wrong": f"“{WRONG}”"}
 VARIATIONS: dict[str, Variation] = {
     "system": Variation("Systems", MOTION, _systems(False), (), lambda s, v: replace(s, system=v)),
     "scales": Variation(
-        "Scales kept", MOTION, _scales, ("2", "5", "10"), lambda s, v: replace(s, scales=int(v))),
+        "Scales kept", MOTION, _scales, ("2", "5", "10"), lambda s, v: replace(s, scales=int(v)),
+        "Scales 1 to {}"),
     "caption": Variation(
         "Caption", MOTION, lambda services: [(text, key) for key, text in _WORDS.items()], tuple(_WORDS),
         lambda s, v: s if v == "own" else replace(s, text=WRONG if v == "wrong" else "")),
     "g": Variation(
-        "Guidance g, decoder", MOTION, _listed("g = {}", "0", "0.5", "1", "2", "3", "4", "6"), ("0", "2", "4"),
-        lambda s, v: replace(s, guidance=float(v))),
+        "Guidance g, decoder", MOTION, _listed("0", "0.5", "1", "2", "3", "4", "6"), ("0", "2", "4"),
+        lambda s, v: replace(s, guidance=float(v)),
+        "g = {}"),
     "maker": Variation("Systems", PROMPT, _systems(True), (), lambda s, v: _with_its_sampling(s, v)),
     "seed": Variation(
-        "Seed", PROMPT, _listed("seed {}", *map(str, range(10))), ("0", "1", "2", "3"),
-        lambda s, v: replace(s, seed=int(v))),
+        "Seed", PROMPT, _listed(*map(str, range(10))), ("0", "1", "2", "3"),
+        lambda s, v: replace(s, seed=int(v)),
+        "Seed {}"),
     "s": Variation(
-        "Guidance s, generator", PROMPT, _listed("s = {}", "0", "1", "2", "3", "4", "6"), ("0", "3", "6"),
-        lambda s, v: replace(s, cfg=float(v))),
+        "Guidance s, generator", PROMPT, _listed("0", "1", "2", "3", "4", "6"), ("0", "3", "6"),
+        lambda s, v: replace(s, cfg=float(v)),
+        "s = {}"),
     "temperature": Variation(
-        "Temperature", PROMPT, _listed("temperature {}", "0", "0.5", "1", "1.5", "2"), ("0", "1", "2"),
-        lambda s, v: replace(s, temperature=float(v))),
+        "Temperature", PROMPT, _listed("0", "0.5", "1", "1.5", "2"), ("0", "1", "2"),
+        lambda s, v: replace(s, temperature=float(v)),
+        "Temperature {}"),
 }  # fmt: skip
 
 
@@ -136,7 +142,7 @@ def settings_of(
     base = Setting("", system.name, words, long, number, own.cfg, own.temperature, own.guidance)
     base = replace(base, guidance=0.0) if variation.of == MOTION else base
     return [
-        variation.apply(replace(base, name=title[:1].upper() + title[1:]), name)
+        variation.apply(replace(base, name=variation.called.format(title)), name)
         for title, name in chosen(services, vary, picked)
     ]
 

@@ -149,7 +149,7 @@ class Visit:
     shown: Result | None = None
     take: int = 0  # which motion's tokens are on the score
     wanted: tuple[Change, ...] = ()  # of a link, to be made after its wish
-    picked: str = ""  # what the card of a token was asked for
+    picked: str = ""  # the code that was clicked in the card of a token, "" for none
     token: tuple[int, int] | None = None  # (scale, position) that the card is about
 
     def keep(self, result: Result) -> None:

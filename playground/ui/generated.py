@@ -11,9 +11,9 @@ from playground.results import Generation, GenerationStep
 from playground.ui.cards import term
 from playground.ui.drawing import Drawing, Result, Visit, Wish, made_name
 from playground.ui.facts import Fact, significant
-from playground.ui.picker import Entry, shelf
 from playground.ui.scenes import score, token_facts
 from playground.ui.services import Services
+from playground.ui.shelf import Entry, shelf
 from playground.ui.state import State, query
 from playground.ui.view import View
 
@@ -112,10 +112,11 @@ def token_card(found: "Alternatives", size: int, color: Sequence[str]) -> str:
     stay = {1: "", 2: "; scale 1 stays"}.get(found.scale, f"; scales 1 to {found.scale - 1} stay")
     return (
         f'<section class="mtp-drawn" aria-label="The chosen token"><header><h2>Code {found.chosen}</h2>'
-        f'<span>{place}</span><button type="button" class="mtp-back" data-close>Back to the prompt</button></header>'
+        f'<span>{place}</span><button type="button" class="mtp-back" data-deselect="generate">Back to the prompt'
+        "</button></header>"
         f"<p>{told} Click another code to put it here and draw {redrawn} anew{stay}.</p>"
         f'<div class="mtp-codes">{rows}</div>'
-        f'<button type="button" class="mtp-anew" data-pick="anew">Draw anew from scale {found.scale} with another seed'
+        f'<button type="button" class="mtp-anew" data-do="anew">Draw anew from scale {found.scale} with another seed'
         "</button></section>"
     )
 
@@ -124,7 +125,7 @@ def _row(code: int, share: float, chance: float, most: float, tint: str, chosen:
     note = "now here" if chosen else "" if chance > 0 else "cut off (top-k, top-p)"
     width = round(100 * share / most)
     return (
-        f'<button type="button" data-pick="code:{code}"{" disabled" if chosen else ""}'
+        f'<button type="button" data-do="code" data-code="{code}" data-key="{code}"{" disabled" if chosen else ""}'
         f' aria-label="Code {code}, {_share(share)}{", " + note if note else ""}">'
         f'<i style="background:{tint}"></i><b>{code}</b><span class="mtp-bar"><i style="width:{width}%"></i></span>'
         f"<span>{_share(share)}</span><small>{note}</small></button>"

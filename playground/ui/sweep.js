@@ -1,31 +1,34 @@
-// The sweep beside the slider of g: a line stands at the slider's g, and a click on a curve takes the slider there.
+// The sweep beside the slider of g: a line stands at the slider's g, and a click on a panel takes the slider there.
 const chart = () => document.querySelector("#guidance-sweep .mtp-chart");
 const slider = () => document.querySelector("#guidance-g input[type=range]");
-let waiting = false;
 
-function place() {
-  waiting = false;
-  const box = chart(), g = Number(slider()?.value);
-  if (!window.Plotly || !box?.layout?.shapes || !Number.isFinite(g)) return;
-  const patch = {};
-  box.layout.shapes.forEach((shape, i) => {
-    if (shape.name === "now" && shape.x0 !== g) Object.assign(patch, { [`shapes[${i}].x0`]: g, [`shapes[${i}].x1`]: g });
-  });
-  if (Object.keys(patch).length) Plotly.relayout(box, patch);
+// The panels as [x axis, y axis], once they are drawn.
+function panels(box) {
+  const { xaxis, yaxis, xaxis2, yaxis2 } = box?._fullLayout ?? {};
+  return [[xaxis, yaxis], [xaxis2, yaxis2]].filter(([x, y]) => x && y);
 }
 
-window.mtpMarkGuidance = () => {
-  if (!waiting) requestAnimationFrame(place); // at most once a frame, however fast the slider is dragged
-  waiting = true;
-};
+// Two elements over the chart: moving them costs nothing, so the line keeps up with the slider.
+function place(g = Number(slider()?.value)) {
+  const box = chart();
+  panels(box).forEach(([x, y], n) => {
+    const line = box.querySelectorAll(".mtp-now")[n] ?? box.appendChild(document.createElement("i"));
+    const at = x.l2p(g);
+    line.className = "mtp-now";
+    line.dataset.g = g;
+    line.hidden = at < 0 || at > x._length;
+    Object.assign(line.style, { left: `${x._offset + at}px`, top: `${y._offset}px`, height: `${y._length}px` });
+  });
+}
 
 // g under a pointer, in either panel; null beside them.
 function pointed(box, event) {
-  const x = event.clientX - box.getBoundingClientRect().left, { xaxis, xaxis2 } = box._fullLayout ?? {};
-  const axis = [xaxis, xaxis2].find((one) => one && x >= one._offset && x <= one._offset + one._length);
-  return axis ? axis.p2d(x - axis._offset) : null;
+  const x = event.clientX - box.getBoundingClientRect().left;
+  const found = panels(box).find(([axis]) => x >= axis._offset && x <= axis._offset + axis._length);
+  return found ? found[0].p2l(x - found[0]._offset) : null;
 }
 
+window.mtpMarkGuidance = (g) => place(Number(g));
 document.addEventListener("mtp-drawn", (event) => event.target === chart() && place());
 document.addEventListener("click", (event) => {
   const box = chart(), g = box?.contains(event.target) ? pointed(box, event) : null, range = slider();

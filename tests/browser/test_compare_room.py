@@ -1,9 +1,10 @@
 """Compare as a visitor uses it: another thing that differs, more of it, whose tokens, a link, a phone."""
 
+import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.conftest import PHONE, Visit
 
@@ -20,21 +21,25 @@ def seen(visit: Go, stand_in: str) -> Visit:
     return found
 
 
+def chip(page: Page, name: str) -> Locator:
+    """One choice of what stands side by side."""
+    return page.locator("#compare-values label").filter(has_text=re.compile(f"^\\s*{name}\\s*$"))
+
+
 def test_settings_stand_side_by_side_and_the_best_is_marked(seen: Visit, visit: Go) -> None:
     page = seen.page
-    expect(page.locator("#compare-table tbody tr")).to_have_count(3)
-    expect(page.locator("#compare-table tbody tr").last.locator("td").first.locator("strong")).to_have_count(1)
-    page.get_by_label("5 scales", exact=True).uncheck()
-    page.get_by_label("7 scales", exact=True).check()
+    expect(page.locator("#compare-take tbody tr")).to_have_count(3)
+    expect(page.locator("#compare-take tbody tr").last.locator("td").first.locator("strong")).to_have_count(1)
+    for name in ("5", "7"):
+        chip(page, name).click()
     page.locator("#compare-go").click()
-    expect(page.locator("#compare-table")).to_contain_text("7 scales")
-    page.locator("#compare-take label", has_text="7 scales").click()
-    expect(page.locator("#compare-score .ms-heads")).to_contain_text("7 scales")
+    page.get_by_role("button", name="Scales 1 to 7").click()
+    expect(page.locator("#compare-score .ms-heads")).to_contain_text("scales 1 to 7")
     page.wait_for_url(lambda url: "values=2_7_10" in url and "take=1" in url)
     other = visit(page.url).page
-    expect(other.locator("#compare-score .ms-heads")).to_contain_text("7 scales")
-    expect(other.locator("#compare-table tbody tr")).to_have_count(3)
-    expect(other.get_by_label("7 scales", exact=True)).to_be_checked()
+    expect(other.locator("#compare-score .ms-heads")).to_contain_text("scales 1 to 7")
+    expect(other.locator("#compare-take tbody tr")).to_have_count(3)
+    expect(chip(other, "7").locator("input")).to_be_checked()
     assert seen.complaints == []
 
 
@@ -48,17 +53,17 @@ def test_a_prompt_with_other_seeds(seen: Visit) -> None:
     prompt.fill("a person hops")
     page.locator("#compare-go").click()
     page.wait_for_function(SHOWN, arg=4)
-    expect(page.locator("#compare-table")).to_contain_text("“a person hops”")
-    expect(page.locator("#compare-table thead")).to_contain_text("from the first")
+    expect(page.locator("#compare-take")).to_contain_text("“a person hops”")
+    expect(page.locator("#compare-take thead")).to_contain_text("from the first")
 
 
 def test_one_alone_is_refused_in_a_sentence(seen: Visit) -> None:
     page = seen.page
-    for name in ("5 scales", "10 scales"):
-        page.get_by_label(name, exact=True).uncheck()
+    for name in ("5", "10"):
+        chip(page, name).click()
     page.locator("#compare-go").click()
     expect(page.locator("#compare-message [role=alert]")).to_contain_text("Choose 2 to 5 of them")
-    expect(page.locator("#compare-table tbody tr")).to_have_count(3)
+    expect(page.locator("#compare-take tbody tr")).to_have_count(3)
 
 
 def test_a_phone_never_scrolls_sideways(visit: Go, stand_in: str) -> None:

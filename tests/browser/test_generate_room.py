@@ -38,7 +38,7 @@ def test_a_token_is_forced_and_the_visit_leads_back(seen: Visit) -> None:
     first = page.evaluate(IDS)
     pick_token(page)
     expect(page.locator("#generate-prompt")).not_to_be_visible()
-    page.locator("#generate-token [data-pick^=code]:enabled").first.click()
+    page.locator("#generate-token [data-do=code]:enabled").first.click()
     page.wait_for_function(DONE, arg=2)
     expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Before")
     expect(page.locator("#generate-message")).to_contain_text("token 2 set to code")

@@ -3,7 +3,9 @@
 import sys
 import time
 
+from playground.analysis.results import write_result
 from playground.ui.app import launch
+from tests.figures.test_sweep import swept
 from tests.ui.double import FakeEngine
 
 
@@ -11,6 +13,7 @@ def main() -> None:
     """Every scale of a generation takes SECONDS_A_SCALE, so that a person, or a test, can see it grow."""
     port, pause = int(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
     engine = FakeEngine(pause=lambda: time.sleep(pause))
+    write_result(swept(), engine.assets / "results")
     launch(port=port, engine=lambda: engine)
 
 

@@ -121,21 +121,22 @@ def test_a_link_shows_controls_and_results(services: Services) -> None:
     do, held = Handlers(services), Held()
     query = "?room=compare&vary=s&values=0_6_9&prompt=a+person+sits&seconds=2&seed=4&take=1"
     *_, last = do.arrive(held, SimpleNamespace(query=query))  # type: ignore[arg-type]
-    stage, _, which, vary, values, prompt, seconds, seed, _, for_prompt, for_motion = last
+    stage, table, vary, values, prompt, seconds, seed, _, for_prompt, for_motion = last
     assert (vary, values["value"], prompt, seconds, seed) == ("s", ["0", "6"], "a person sits", 2.0, 4)
-    assert for_prompt["visible"] and not for_motion["visible"] and which["value"] == "1" and '"one1"' in stage
+    assert for_prompt["visible"] and not for_motion["visible"] and '"one1"' in stage
+    assert 'data-key="1" aria-pressed="true"' in table
     assert [one.setting.cfg for one in held.done] == [0.0, 6.0]
     *_, plain = do.arrive(Held(), SimpleNamespace(query="?room=compare&vary=system"))  # type: ignore[arg-type]
-    assert plain[3] == "scales"  # one system alone is nothing to compare
+    assert plain[2] == "scales"  # one system alone is nothing to compare
     assert parse(query)["values"] == "0_6_9"
 
 
 def test_another_ones_tokens_are_shown_with_what_differs(services: Services) -> None:
     do, held = Handlers(services), Held()
-    with pytest.raises(PlaygroundError, match="press Compare first"):
-        do.look_at(held, "1")
+    stage, table, take = do.look_at(held, SimpleNamespace(code="1"))  # type: ignore[arg-type]
+    assert take == "1" and "Scales 1 to 5" in stage and table.count('aria-pressed="true"') == 1  # of the opening
     list(do.compare(held, "caption", ["own", "none"], "", 4.0, 0, "m0"))
-    (stage,) = do.look_at(held, "1")
+    stage, *_ = do.look_at(held, SimpleNamespace(code="1"))  # type: ignore[arg-type]
     assert "no caption" in stage and "another code than the first" in stage
 
 

@@ -131,18 +131,18 @@ def test_a_token_is_asked_about_forced_and_the_visit_remembers(services: Service
     do, visit = Handlers(services), Visit()
     list(do.generate(visit, "a person sits", False, *NUMBERS, 1))
     (card,) = do.token(visit, event(selection={"system": "lgtok-lite", "scale": 5, "position": 2}))
-    assert "scale 5, token 3 of 6" in card and "scales 1 to 4 stay" in card and card.count("code:") == 8
-    do.choose(visit, event(id="code:201"))
+    assert "scale 5, token 3 of 6" in card and "scales 1 to 4 stay" in card and card.count('data-do="code"') == 8
+    do.choose(visit, event(code="201"))
     *_, last = do.redraw(visit)
     assert len(last) == SHOWN and isinstance(last[0], Noted) and "token 3 set to code 201" in last[0].text
-    assert last[5] == "5.2.201" and last[3].count("data-pick") == 2
-    do.choose(visit, event(id="anew"))
+    assert last[5] == "5.2.201" and last[3].count("data-do") == 2
+    do.choose(visit, event(code=""))
     *_, last = do.redraw(visit)
     assert last[5] == "5.2.201_5.s4"
-    back = do.bring_back(visit, event(id="0"))
+    back = do.bring_back(visit, event(code="0"))
     assert back[5] == "" and back[7] == "a person sits" and visit.shown is visit.results[0]
     with pytest.raises(PlaygroundError, match="not kept any more"):
-        do.bring_back(visit, event(id="9"))
+        do.bring_back(visit, event(code="9"))
     assert do.token(visit, event(selection=None)) == ("",)
 
 
@@ -150,7 +150,7 @@ def test_a_link_with_changes_gives_the_motion_it_was_made_from(services: Service
     do, first, other = Handlers(services), Visit(), Visit()
     list(do.generate(first, "a person sits", False, *NUMBERS, 1))
     do.token(first, event(selection={"scale": 3, "position": 0}))
-    do.choose(first, event(id="code:9"))
+    do.choose(first, event(code="9"))
     list(do.redraw(first))
     do.fill(other, event(query=f"?room=generate&prompt=a+person+sits&seconds=4&seed=3&changes={'3.0.9'}"))
     list(do.generate(other, "a person sits", False, *NUMBERS, 1))

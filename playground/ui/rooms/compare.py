@@ -12,6 +12,7 @@ from playground.motion.motion import Motion
 from playground.ui.compared import compared_view
 from playground.ui.comparing import MOTION, PROMPT, VARIATIONS, Compared, chosen, offered, run, settings_of
 from playground.ui.errors import attach, message_place
+from playground.ui.inspector import inspector
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.services import Services
@@ -25,8 +26,9 @@ WISHES = ("vary", "values", "prompt", "seconds", "seed", "motion")  # keys of th
 USUAL = str(control(NAME, "vary").default)
 KEEP = """(vary, values, prompt, seconds, seed, motion) => window.mtpState?.keep(
   'compare', ['vary', 'values', 'prompt', 'seconds', 'seed', 'motion', 'take', 'selection'],
-  [vary, values.join('_'), prompt, seconds, seed, motion, null, null]);"""
+  [vary, [...values].sort((a, b) => a - b || 0).join('_'), prompt, seconds, seed, motion, null, null]);"""
 KEEP_TAKE = "(take) => window.mtpState?.keep('compare', ['take'], [Number(take) || null])"
+LAST = 9  # more than there are: the last one
 
 
 @dataclass(eq=False)
@@ -58,12 +60,12 @@ def opening_view(services: Services) -> View:
     """The room's first result: a motion rebuilt from fewer and from more scales."""
     example = services.opening_example()
     picked = [name for _, name in chosen(services, USUAL, ())]
-    *_, last = compare(services, Held(), USUAL, picked, "", 4.0, 0, example.id)
+    *_, last = compare(services, Held(), USUAL, picked, "", 4.0, 0, example.id, take=LAST)
     return View(last.stage, controls={**last.controls, "motion": example.id}, seconds=last.seconds)
 
 
 class Handlers:
-    """What the controls do. A result is stage, table, and the choice whose tokens are shown."""
+    """What the controls do. A result is stage and table."""
 
     def __init__(self, services: Services) -> None:
         self.services = services
@@ -77,14 +79,17 @@ class Handlers:
     def compare(self, held: Held, *values: Any, take: int = 0) -> Iterator[tuple[Any, ...]]:
         """All settings, one after the other."""
         for view in compare(self.services, held, *values, take=take):
-            yield view.stage_json(), view.controls["table"], self._which(held, take)
+            yield view.stage_json(), view.controls["table"]
 
-    def look_at(self, held: Held, place: str) -> tuple[Any, ...]:
-        """The tokens of another one."""
+    def look_at(self, held: Held, event: gr.EventData) -> tuple[Any, ...]:
+        """A name in the table: its tokens. The stored opening is computed once more for that."""
+        take = int(event.code)
         if not held.done:
-            raise PlaygroundError("press Compare first; then the tokens of each can be shown")
-        view = compared_view(self.services, held.done, held.source, held.name, int(place))
-        return (view.stage_json(),)
+            picked = [name for _, name in chosen(self.services, USUAL, ())]
+            for _ in compare(self.services, held, USUAL, picked, "", 4.0, 0, None):
+                pass
+        view = compared_view(self.services, held.done, held.source, held.name, take)
+        return view.stage_json(), view.controls["table"], str(take)
 
     def arrive(self, held: Held, event: gr.EventData) -> Iterator[tuple[Any, ...]]:
         """What a link asks for: the controls, then the results."""
@@ -102,12 +107,8 @@ class Handlers:
 
     def _values(self, vary: str, picked: list[str]) -> Any:
         variation = VARIATIONS[vary]
-        label = f"{control(NAME, 'values').label}, 2 to {variation.most}"
+        label = _choose(vary)
         return gr.update(choices=list(variation.choices(self.services)), value=picked, label=label)
-
-    def _which(self, held: Held, take: int) -> Any:
-        choices = [(one.setting.name, str(n)) for n, one in enumerate(held.done)]
-        return gr.update(choices=choices, value=str(min(take, len(choices) - 1)), visible=len(choices) > 1)
 
 
 def room(services: Services) -> None:
@@ -119,19 +120,19 @@ def room(services: Services) -> None:
         with panel("Side by side", LEAD):
             wishes, rows, go = _controls(services, opening)
             message = message_place("compare-message")
-            table = gr.HTML(opening.controls.get("table", ""), elem_id="compare-table", apply_default_css=False)
-            which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="compare-take")
+            table = inspector(opening.controls.get("table", ""), elem_id="compare-take")
         words(NAME)
         door = link_door(NAME)
+        take = gr.Textbox(elem_classes=["mtp-unseen"], show_label=False, container=False)
     do = Handlers(services)
-    asks, shown = [wishes[key] for key in WISHES], [stage, table, which]
+    asks, shown = [wishes[key] for key in WISHES], [stage, table]
     silent: dict[str, Any] = {"api_visibility": "private"}
     attach(wishes["vary"].input, do.set_vary, [wishes["vary"]], [wishes["values"], *rows], message, model=False)
     for event in (go.click, wishes["prompt"].submit):
         attach(event, do.compare, [held, *asks], shown, message, stage=NAME, doing=DOING)
         event(None, asks, None, js=KEEP, **silent)
-    attach(which.input, do.look_at, [held, which], [stage], message, model=False)
-    which.input(None, [which], None, js=KEEP_TAKE, **silent)
+    looked = attach(table.act, do.look_at, [held], [*shown, take], message)
+    looked.then(None, [take], None, js=KEEP_TAKE, **silent)
     arrival(door, do.arrive, [held], [*shown, *asks, *rows], message, room=NAME, stage=NAME, doing=DOING)
     commits(NAME, {"motion": wishes["motion"]}, wishes["motion"].input, forget=("selection",))
 
@@ -148,7 +149,7 @@ def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[A
         go = gr.Button("Compare", variant="primary", size="sm", scale=0, min_width=84, elem_id="compare-go")
     found["values"] = gr.CheckboxGroup(
         list(variation.choices(services)) if picked else [], value=picked, elem_id="compare-values",
-        label=f"{control(NAME, 'values').label}, 2 to {variation.most}",
+        label=_choose(USUAL),
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line"], visible=variation.of == PROMPT) as of_prompt:
         found["prompt"] = gr.Textbox(
@@ -167,6 +168,10 @@ def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[A
             elem_id="compare-example", scale=1, min_width=160,
         )  # fmt: skip
     return found, [of_prompt, of_motion], go
+
+
+def _choose(vary: str) -> str:
+    return f"{VARIATIONS[vary].title}: choose 2 to {VARIATIONS[vary].most}"
 
 
 def chosen_or_none(services: Services) -> list[tuple[str, str]]:

@@ -26,9 +26,9 @@ from playground.ui.drawing import (
 )
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.generated import drawing_view, earlier, onward, result_view, token_card
+from playground.ui.inspector import inspector
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import asked, commits, link_door
-from playground.ui.picker import picker
 from playground.ui.services import Services
 from playground.ui.stage.component import stage_call
 from playground.ui.state import control
@@ -115,7 +115,7 @@ class Handlers:
 
     def choose(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
         """A click in the card of a token, before any waiting."""
-        visit.picked = str(event.id)
+        visit.picked = str(event.code)
         return self.begin(visit)
 
     def redraw(self, visit: Visit) -> Iterator[tuple[Any, ...]]:
@@ -124,9 +124,8 @@ class Handlers:
         if visit.token is None:
             raise PlaygroundError("choose a token in the score first")
         scale, position = visit.token
-        kind, _, code = visit.picked.partition(":")
         other = (result.takes[visit.take].seed + 1) % LIMITS.max_seed
-        wanted = Change(scale, position, int(code)) if kind == "code" else Change(scale, seed=other)
+        wanted = Change(scale, position, int(visit.picked)) if visit.picked else Change(scale, seed=other)
         yield from self._run(visit, change(self.services, result, visit.take, wanted))
 
     def token(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
@@ -140,7 +139,7 @@ class Handlers:
 
     def bring_back(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
         """A result of the visit, at once, with the controls that made it."""
-        result = visit.open(int(event.id))
+        result = visit.open(int(event.code))
         return self._result(visit, result, result_view(self.services, result))
 
     def look_at(self, visit: Visit, place: str) -> tuple[Any, ...]:
@@ -198,14 +197,14 @@ def room(services: Services) -> None:
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
         with panel("Words become a motion", LEAD):
-            card = picker("generate-token", stage=NAME)
+            card = inspector(elem_id="generate-token")
             with gr.Column(elem_classes=["mtp-form"], min_width=0):
                 prompt, seconds, seed, takes, buttons = _controls(opening)
             which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="generate-take")
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
             further = gr.HTML("", elem_id="generate-onward", apply_default_css=False)
-            shelf = picker("generate-earlier", stage=NAME)
+            shelf = inspector(elem_id="generate-earlier")
             free, *numbers = _knobs(services.sampling())
         words(NAME)
         door = link_door(NAME)
@@ -229,16 +228,16 @@ def _wire(do: Handlers, visit: Any, message: Any, shown: list[Any], buttons: lis
         run.then(None, [changes, which], None, js=KEEP, **silent)
         ended = run.then(do.end, None, buttons, **quick)
     ended.then(None, None, None, js=f"() => window.mtpState?.settled('{NAME}')", **silent)
-    for event in (go.click, prompt.submit, shelf.pick):
+    for event in (go.click, prompt.submit, shelf.act):
         event(None, None, None, js=stage_call(NAME, "select", None), **silent)
     commits(NAME, keys, go.click, prompt.submit, forget=("selection", "changes", "take"))
     cancel.click(do.stop, [visit], [cancel], **quick)
 
     attach(stage.select, do.token, [visit], [card], message, trigger_mode="always_last")
-    started = card.pick(do.choose, [visit], buttons, **quick)
+    started = card.act(do.choose, [visit], buttons, **quick)
     again = attach(started.then, do.redraw, [visit], shown, message, stage=NAME, doing="Drawing anew")
     again.then(do.end, None, buttons, **quick)
-    back = attach(shelf.pick, do.bring_back, [visit], shown, message, model=False)
+    back = attach(shelf.act, do.bring_back, [visit], shown, message, model=False)
     look = attach(which.input, do.look_at, [visit, which], shown, message, model=False)
     for run in (again, back, look):
         run.then(None, [changes, which], None, js=KEEP, **silent)

@@ -18,21 +18,20 @@ from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.scenes import guidance_scene, token_facts
 from playground.ui.services import Services
 from playground.ui.stage.component import stage_call
-from playground.ui.state import control
+from playground.ui.state import State, control, query
 from playground.ui.uploads import checked_number
 from playground.ui.view import View
 
 NAME = "guidance"
 LEAD = (
-    "The same tokens, read with the caption and without. Drag g: the first figure follows, the others stay at 0 to 4."
+    "The same tokens, read with and without the caption: drag g. The generator's guidance s, in contrast, chooses "
+    "other tokens."
 )
-DIFFERENCE = "The generator's guidance s chooses other tokens; g leaves them as they are and changes how they are read."
 FIRST = float(control(NAME, "g").default)
 FORMULA = '<p class="mtp-formula">m = (1 + g) · m<sub>words</sub> − g · m<sub>wordless</sub></p>'
 DOING = "Decoding twice"
-HEIGHT = 112  # pixels of the sweep
 MARKING = (Path(__file__).parent.parent / "sweep.js").read_text(encoding="utf-8")
-ITEM = "guidance_sweep"
+ITEM, SWEEP_HEIGHT = "guidance_sweep", 104
 SWEEP_LABEL = "Quality of generated motions against g; a click takes g there"
 
 
@@ -56,6 +55,20 @@ def opening_view(services: Services) -> View:
     return run(services, example.id, example.caption)
 
 
+def facts_html(view: View) -> str:
+    """The line of numbers, and where this motion can be taken next."""
+    motion = view.controls.get("example")
+    if not motion:
+        return view.facts_html()
+    links = [("g", "Compare values of g"), ("caption", "with other captions")]
+    parts = [
+        f'<a data-state href="{html.escape(query(State("compare", {"vary": vary, "motion": motion})), quote=True)}">'
+        f"{words}</a>"
+        for vary, words in links
+    ]
+    return f'{view.facts_html()}<p class="mtp-aside mtp-onward">{" · ".join(parts)}</p>'
+
+
 def sweep(services: Services) -> tuple[str | None, str]:
     """The stored sweep of the page's system as Plotly JSON text (None where there is none), and one sentence on it."""
     try:
@@ -67,7 +80,7 @@ def sweep(services: Services) -> tuple[str | None, str]:
         return None, f"FID and R-Precision against g have not been measured for {system.title} yet."
     from playground.figures.sweep import small_sweep
 
-    return str(small_sweep(found, FIRST).to_json()), f"Measured on {found.line}; bars are 95 % intervals."
+    return str(small_sweep(found).to_json()), f"Measured on {found.line}; top 3 of 32; bars are 95 % intervals."
 
 
 class Handlers:
@@ -83,7 +96,7 @@ class Handlers:
     def again(self, wanted: str, text: str, at: float) -> tuple[Any, ...]:
         """The same motion with another caption."""
         view = run(self.services, wanted, text, checked_number(at, "g", 0, LIMITS.max_guidance))
-        return view.stage_json(), view.facts_html(), view.controls["caption"]
+        return view.stage_json(), facts_html(view), view.controls["caption"]
 
     def arrive(self, event: gr.EventData) -> tuple[Any, ...]:
         """What a link asks for, the motion and g included."""
@@ -104,7 +117,7 @@ def room(services: Services) -> None:
             gr.HTML(FORMULA, apply_default_css=False)
             curve, told = sweep(services)
             if curve is not None:
-                chart(curve, label=SWEEP_LABEL, height=HEIGHT, elem_id="guidance-sweep")
+                chart(curve, label=SWEEP_LABEL, height=SWEEP_HEIGHT, elem_id="guidance-sweep")
             gr.HTML(f'<p class="mtp-aside mtp-small">{html.escape(told)}</p>', apply_default_css=False,
                     elem_id="guidance-measured")  # fmt: skip
             with gr.Row(elem_classes=["mtp-line"]):
@@ -118,8 +131,7 @@ def room(services: Services) -> None:
                 )  # fmt: skip
                 go = gr.Button("Decode", variant="primary", size="sm", scale=0, min_width=72, elem_id="guidance-go")
             message = message_place("guidance-message")
-            facts = gr.HTML(opening.facts_html(), elem_id="guidance-facts", apply_default_css=False)
-            gr.HTML(f'<p class="mtp-aside">{DIFFERENCE}</p>', apply_default_css=False)
+            facts = gr.HTML(facts_html(opening), elem_id="guidance-facts", apply_default_css=False)
         words(NAME)
         door = link_door(NAME)
         gr.HTML("", js_on_load=MARKING, apply_default_css=False, elem_classes=["mtp-unseen"])
