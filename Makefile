@@ -47,8 +47,9 @@ format: $(DEV) ## let ruff format the code
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-notebooks: $(DEV) ## execute every notebook in place
-	$(BIN)/jupyter execute --inplace --timeout=1800 notebooks/*.ipynb
+notebooks: $(DEV) ## execute every notebook; what they show is in build/notebooks, the notebooks themselves stay without outputs
+	@mkdir -p build/notebooks
+	$(BIN)/jupyter execute --output='../build/notebooks/{notebook_name}' --timeout=1800 notebooks/*.ipynb
 
 figures: $(DEV) $(LIBRARY)/library.json ## make the stored results that are missing or of other checkpoints (hours; stops and goes on at will)
 	$(BIN)/python -m playground.evaluation.published --library $(LIBRARY)
