@@ -26,7 +26,7 @@ from playground.motion.motion import Motion
 from playground.motion.stitch import runs
 
 PROMPTS: tuple[tuple[str, float, bool], ...] = (  # what the pictures of the paper are of, in our words; then our own
-    ("a person walks forward with confidence", 5.0, True),
+    ("a person walks ahead with confidence", 5.0, True),
     ("a person walks along a narrow beam and keeps the balance", 5.0, False),
     ("a person takes a step forward with the right foot", 3.0, True),
     ("a person crawls forward on hands and knees", 5.0, False),
