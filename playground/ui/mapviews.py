@@ -66,7 +66,8 @@ class Views:
 def panel_views(services: Services, systems: list[str], opening: View, near: str) -> Views:
     """Everything of the panel, from top to bottom."""
     made = _choices(services, systems, opening)
-    plot = chart(opening.charts.get("maps"), label="Maps of motions", height=HEIGHT, elem_id="embedding-map")
+    plot = chart(opening.charts.get("maps"), label="Maps of motions", height=HEIGHT, elem_id="embedding-map",
+                 narrowest=560)  # fmt: skip
     message = message_place("embedding-message")
     facts = gr.HTML(opening.facts_html(), elem_id="embedding-facts", apply_default_css=False)
     nearest = gr.Radio(opening.controls.get("near", []), value=None, label=near, elem_id="embedding-near")
