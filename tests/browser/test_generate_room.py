@@ -71,14 +71,6 @@ def test_seeds_stand_side_by_side_and_their_link_shows_the_same(seen: Visit, vis
     assert other.evaluate(IDS) == shown
 
 
-def test_stopping_keeps_what_there_is(seen: Visit) -> None:
-    page = seen.page
-    page.locator("#generate-go").click()
-    page.locator("#generate-stop").click()  # possible as soon as it runs
-    expect(page.locator("#generate-message")).to_contain_text("Stopped")
-    expect(page.locator("#generate-go")).to_be_enabled()
-
-
 def test_a_phone_shows_the_card_of_a_token(visit: Go, stand_in: str) -> None:
     page = visit(f"{stand_in}?room=generate", viewport=PHONE, has_touch=True, is_mobile=True).page
     page.wait_for_function(DONE, arg=1)
