@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from playground.figures.colors import hex_to_rgb
 from playground.motion.skeleton import HUMAN22
@@ -110,6 +109,8 @@ def place(joints: NDArray[np.floating]) -> Floats:
 
 def surface(centres: Floats) -> Surface:
     """The skin of one pose, from its sphere centres [S, 3]. Where spheres of a hull coincide, the hull still stands."""
+    from scipy.spatial import ConvexHull  # here, so that the page opens without it
+
     rays = _rays()
     points, faces, tones = [], [], []
     count = 0

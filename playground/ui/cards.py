@@ -145,7 +145,7 @@ def _formula(text: str) -> str:
         return f"<{tag}>{match[2].strip('{}')}</{tag}>"
 
     placed = _LOW_HIGH.sub(shifted, html.escape(text))
-    return re.sub(r"(?<![A-Za-z&/])([A-Za-zẑφ])(?![A-Za-z;])", r"<i>\1</i>", placed)
+    return re.sub(r"(?<![A-Za-z&])([A-Za-zẑφ])(?![A-Za-z;])", r"<i>\1</i>", placed)
 
 
 def _paragraphs(text: str, lead: str = "") -> str:
