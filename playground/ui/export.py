@@ -29,7 +29,6 @@ from playground.errors import PlaygroundError
 from playground.figures.pictures import Actor
 from playground.figures.video import write_job
 from playground.limits import LIMITS
-from playground.motion.formats import write_motion
 from playground.motion.motion import Motion
 from playground.motion.skeleton import HUMAN22
 from playground.systems import row_of
@@ -160,6 +159,8 @@ def write(wish: Wish, folder: Path) -> tuple[Path, list[str]]:
     if wish.tokens is not None:
         path.write_text(wish.tokens.to_json(), encoding="utf-8")
         return path, []
+    from playground.motion.formats import write_motion
+
     actor = wish.actors[0]
     return path, write_motion(Motion(actor.joints.astype(np.float32), name=actor.name), path)
 
