@@ -11,6 +11,7 @@ import base64
 import queue
 import re
 import secrets
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -236,7 +237,8 @@ class Handlers:
     def write(self, control: Control, event: gr.EventData) -> dict[str, Any]:
         """A motion file or tokens, at once."""
         try:
-            path, changes = write(read_wish(self.services, event.wish), self._folder())
+            wish = read_wish(self.services, event.wish)
+            path, changes = write(wish, self._folder())
             return _done(path, " ".join(map(as_sentence, changes)))
         except PlaygroundError as error:
             return _failed(error)
@@ -244,12 +246,17 @@ class Handlers:
     def render(self, control: Control, event: gr.EventData) -> Iterator[dict[str, Any]]:
         """A film or a strip, with progress."""
         control.stop = False
+        folder, finished = self._folder(), False
         try:
             yield {"state": "working", "done": 0, "total": 0}
-            for news in render(read_wish(self.services, event.wish), self._folder(), control):
+            for news in render(read_wish(self.services, event.wish), folder, control):
+                finished = isinstance(news, Path)
                 yield _done(news) if isinstance(news, Path) else {"state": "working", "done": news[0], "total": news[1]}
         except PlaygroundError as error:
             yield _failed(error)
+        finally:  # stopped, failed, or the visitor has left
+            if not finished:
+                shutil.rmtree(folder, ignore_errors=True)
 
     def stop(self, control: Control) -> None:
         """Ask a running rendering to end."""

@@ -137,3 +137,12 @@ def test_handlers_answer_in_words_the_browser_reads(services: Services, tmp_path
     failed = do.write(Control(), type("Event", (), {"wish": {"kind": "exe", "query": ""}})())
     assert failed == {"state": "error", "message": "'exe' is nothing that can be exported."}
     assert json.dumps(done) and list(do.render(Control(), type("E", (), {"wish": None})()))[-1]["state"] == "error"
+    assert [path.parent for path in tmp_path.rglob("*") if path.is_file()] == [Path(done["file"]["path"]).parent]
+
+
+def test_a_visitor_who_leaves_leaves_nothing_behind(services: Services, tmp_path: Path) -> None:
+    do, event = Handlers(services, str(tmp_path)), type("Event", (), {"wish": detail("mp4")})()
+    run = do.render(Control(), event)
+    assert next(run)["state"] == "working" and len(list(tmp_path.iterdir())) == 1
+    run.close()  # type: ignore[attr-defined]
+    assert list(tmp_path.iterdir()) == []
