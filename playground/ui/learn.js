@@ -40,7 +40,9 @@
     });
   }
   document.addEventListener('focusout', (event) => termOf(event) && hideCard());
-  document.addEventListener('scroll', hideCard, { capture: true, passive: true });
+  // A term that has the focus keeps its card, also when the focus itself made the page scroll.
+  const onScroll = () => (shown && shown === document.activeElement ? showCard(shown) : hideCard());
+  document.addEventListener('scroll', onScroll, { capture: true, passive: true });
 
   /* The tour: a ring round what is meant, a card beside it, forward and back by button or arrow key, out by Escape. */
   const steps = window.mtpSteps;

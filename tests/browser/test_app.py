@@ -61,6 +61,7 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
     expect(page.locator("#embedding-stage .ms-badge")).to_contain_text("live")
 
     seen.enter("Codebooks")
+    page.get_by_role("button", name="All numbers, scale by scale").click()
     expect(page.locator("#codebooks-table tbody tr")).to_have_count(10)
 
     seen.enter("Generate")
@@ -94,5 +95,9 @@ def test_the_same_seed_shows_the_same_tokens(visit: Go, app: str) -> None:
         page.locator("#generate-go").click()
         expect(page.locator("#generate-go")).to_be_disabled()
         expect(page.locator("#generate-go")).to_be_enabled(timeout=60_000)
+        expect(page.locator("#generate-stage .ms-badge")).to_contain_text("live")  # no more what the room opened with
+        page.wait_for_function(
+            f"() => {{ const all = ({ids})(); return all.length === 10 && all.every((one) => one.length); }}"
+        )
         found.append(page.evaluate(ids))
     assert found[0] == found[1] and len(found[0]) == 10 and all(found[0])

@@ -48,7 +48,7 @@ def test_motions_and_tokens(seen: Visit, tmp_path: Path) -> None:
         "() => window.MotionStage?.get('tokenize')?.data?.tracks[0]?.levels.every((level) => level.ids)"
     )
     box = menu(page)
-    box.get_by_label("Figure to write").select_option(label="From tokens (LG-Tok lite)")
+    box.get_by_label("Figure to write").select_option(label="From tokens")
     shown = page.evaluate("() => Array.from(MotionStage.get('tokenize').joints('rebuilt'))")
     paths = [download(page, box.get_by_role("button", name=kind), tmp_path) for kind in ("NPZ", "BVH", "GLB", "JSON")]
     with np.load(paths[0]) as file:
@@ -95,7 +95,7 @@ def test_plots(seen: Visit, tmp_path: Path) -> None:
     page = seen.enter("Codebooks")
     page.wait_for_function(DRAWN)
     box = menu(page)
-    expect(box.get_by_role("button", name="BVH")).to_have_count(0)
+    expect(box.get_by_role("button", name="BVH")).to_have_count(1)  # the motion that a code stands for
     png, svg, table = (
         download(page, box.get_by_role("button", name=kind).first, tmp_path) for kind in ("PNG", "SVG", "CSV")
     )
@@ -109,7 +109,7 @@ def test_plots(seen: Visit, tmp_path: Path) -> None:
     assert len(rows) == sum(len(trace["x"]) for trace in drawn if trace.get("hoverinfo") != "skip")
     assert {row["panel"] for row in rows} == {str(n) for n in range(1, 11)}
     assert [float(row["y"]) for row in rows[:5]] == drawn[0]["y"][:5]
-    assert [int(row["id"]) for row in rows[:5]] == drawn[0]["customdata"][:5]
+    assert [row["id"] for row in rows[:5]] == drawn[0]["customdata"][:5]
 
 
 def test_where_nothing_is_shown_the_menu_says_so(visit: Go, stand_in: str) -> None:

@@ -211,7 +211,7 @@ def test_the_guidance_slider_moves_the_figure_and_asks_nobody(seen: Visit) -> No
     assert seen.sent_since(mark) == []
 
 
-def test_a_click_on_the_areaputs_that_motion_on_the_stage(seen: Visit) -> None:
+def test_a_click_on_the_map_puts_that_motion_on_the_stage(seen: Visit) -> None:
     page = seen.enter("Embedding map")
     points = page.locator("#embedding-map .scatterlayer .trace .point")
     expect(points.first).to_be_visible()

@@ -105,12 +105,13 @@ def score_slot(name: str, **settings: Any) -> gr.HTML:
 
 def stage_call(name: str, method: str, *arguments: Any) -> str:
     """JavaScript for `js=` of a Gradio listener that calls a method of a stage in the browser. Without arguments the
-    listener's inputs are passed on; the inputs are returned unchanged, so Python may follow."""
+    listener's inputs are passed on; the inputs are returned unchanged, so Python may follow (Gradio reads an
+    array as all inputs, so a single input that is a list stays inside one)."""
     given = json.dumps(list(arguments)) if arguments else "inputs"
     return (
         "(...inputs) => { "
         f"window.MotionStage?.get({json.dumps(name)})?.{method}(...{given}); "
-        "return inputs.length === 1 ? inputs[0] : inputs; }"
+        "return inputs.length === 1 && !Array.isArray(inputs[0]) ? inputs[0] : inputs; }"
     )
 
 
