@@ -109,7 +109,7 @@ def test_plots(seen: Visit, tmp_path: Path) -> None:
     assert len(rows) == sum(len(trace["x"]) for trace in drawn if trace.get("hoverinfo") != "skip")
     assert {row["panel"] for row in rows} == {str(n) for n in range(1, 11)}
     assert [float(row["y"]) for row in rows[:5]] == drawn[0]["y"][:5]
-    assert [row["id"] for row in rows[:5]] == drawn[0]["customdata"][:5]
+    assert [row["id"] for row in rows[:5]] == [known[0] for known in drawn[0]["customdata"][:5]]
 
 
 def test_where_nothing_is_shown_the_menu_says_so(visit: Go, stand_in: str) -> None:
