@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from playground.motion.representation import COLUMNS
 from playground.nn.blocks import UStack
 from playground.nn.linear import Linear
-from playground.nn.rope import sinusoid
+from playground.nn.positions import sinusoid
 from playground.text.features import TextFeatures
 from playground.tokenizers.transformer import length_mask
 

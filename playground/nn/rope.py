@@ -21,9 +21,3 @@ def apply_rope(x: Tensor, rotation: Rotation) -> Tensor:
     cos, sin = (part.to(x.dtype) for part in rotation)
     even, odd = x[..., 0::2], x[..., 1::2]
     return torch.stack([even * cos - odd * sin, even * sin + odd * cos], dim=-1).flatten(-2)
-
-
-def sinusoid(positions: Tensor, width: int) -> Tensor:
-    """Fixed sine/cosine table for positions [T] -> [T, width]: sines in even columns, cosines in odd, base 10000."""
-    cos, sin = rope_angles(positions, width, 10_000.0)
-    return torch.stack([sin, cos], dim=-1).flatten(-2)

@@ -4,7 +4,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from playground.nn.rope import apply_rope, rope_angles, sinusoid
+from playground.nn.rope import apply_rope, rope_angles
 
 
 def slow_rope(vector: list[float], position: float, base: float) -> list[float]:
@@ -39,10 +39,3 @@ def test_scores_depend_on_the_distance_alone():
 
     assert abs(score(3, 10) - score(103, 110)) < 1e-4
     assert abs(score(3, 10) - score(3, 12)) > 1e-3
-
-
-def test_sinusoid_matches_the_formula():
-    table = sinusoid(torch.arange(5), 6)
-    angle = torch.tensor(4.0) / 10_000 ** (torch.tensor([0.0, 2.0, 4.0]) / 6)
-    torch.testing.assert_close(table[4, 0::2], angle.sin())
-    torch.testing.assert_close(table[4, 1::2], angle.cos())
