@@ -95,6 +95,7 @@ class RefitTraining:
     synthetic: float = 0.1
     language_drop: float = 0.1
     velocity: float = 2.0  # weight of smoothL1 on differences of successive rows
+    feet: float = 0.0  # weight of the toes' speed over the ground, where the true ones stand on it
     redrawn: float = 0.45  # share of motions whose fine scales the generator drew anew
     coarse: float = 0.2  # share of motions of which the coarse scales alone are given
     true_scales: int = 3  # at least so many scales are true

@@ -74,7 +74,7 @@ def family(tokenizer: TokenizerTraining, generator: GeneratorTraining, refit: Sc
     }  # the plain residual tokenizer has no scales to draw one after the other
     rows: Rows = {"lgtok-tokenizer": tokenizers["lgtok"], "lgtok-generator": generators["lgtok"]}
     refits = {
-        name: RefitTraining(tokenizers[name], replace(tokenizer.batch, whole=0.8, speed=0.0), refit)
+        name: RefitTraining(tokenizers[name], replace(tokenizer.batch, whole=0.8, speed=0.0), refit, feet=0.1)
         for name in generators
     }
     rows["lgtok-refit"] = refits["lgtok"]

@@ -20,6 +20,8 @@ from torch.nn import functional as F
 from playground.checkpoints import Card, read_card, save_checkpoint
 from playground.data.batches import Batch, BatchSource, Cuts
 from playground.generators.scalewise import Edit, ScalewiseGenerator, ScalewiseTransformer
+from playground.motion.measures import CONTACT_HEIGHT, TOES
+from playground.motion.representation import Normaliser
 from playground.nn.sampling import Sampling
 from playground.nn.transfer import on_device
 from playground.text.store import FeatureStore
@@ -27,6 +29,7 @@ from playground.tokenizers.transformer import LGTok, TrainingOutput
 from playground.training.configs import RefitTraining
 from playground.training.tokenizer import reconstruction_errors, tokenizer_loss
 
+TOE_COLUMNS = torch.tensor([4 + 3 * (toe - 1) for toe in TOES])  # x of each toe; y and z follow
 REFIT = ("decoder", "from_code", "motion_out", "query_positions")  # what is trained
 
 
@@ -86,11 +89,15 @@ class RefitInputs:
 class RefitStep(nn.Module):
     """One training pass of the detokenizer, loss included: what Fabric wraps."""
 
-    def __init__(self, model: LGTok, config: RefitTraining, heading_std: float) -> None:
+    def __init__(self, model: LGTok, config: RefitTraining, normaliser: Normaliser) -> None:
         super().__init__()
         self.tokenizer = model
         self.config = config
-        self.heading_std = heading_std
+        self.heading_std = float(normaliser.std[0])
+        self.mean: Tensor
+        self.std: Tensor
+        self.register_buffer("mean", torch.from_numpy(normaliser.mean.copy()), persistent=False)
+        self.register_buffer("std", torch.from_numpy(normaliser.std.copy()), persistent=False)
         for name, parameter in model.named_parameters():
             parameter.requires_grad_(name.split(".")[0] in REFIT)
 
@@ -104,7 +111,11 @@ class RefitStep(nn.Module):
             result, features, batch.lengths, c.tokenizer_training, self.heading_std, batch.mean_frames
         )
         moved = velocity_loss(out.float(), features, batch.lengths, batch.mean_frames)
-        return loss + c.velocity * moved, moved.detach()
+        loss = loss + c.velocity * moved
+        if c.feet:
+            rows, real = (x * self.std + self.mean for x in (out.float(), features))
+            loss = loss + c.feet * foot_loss(rows, real, batch.lengths, batch.mean_frames)
+        return loss, moved.detach()
 
 
 def velocity_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
@@ -112,6 +123,29 @@ def velocity_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: f
     inside = torch.arange(1, features.shape[1], device=lengths.device)[None] < lengths[:, None]
     error = F.smooth_l1_loss(out.diff(dim=1), features.diff(dim=1), reduction="none").mean(dim=-1)
     return (error * inside).sum() / mean_frames
+
+
+def foot_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
+    """smoothL1 in cm a frame between the horizontal speeds of the toes in out and features [B, F, 67] (metres,
+    radians), weighted by how near the ground the true toe is (the weight of motion/measures.foot_sliding); scalar."""
+    inside = torch.arange(1, features.shape[1], device=lengths.device)[None] < lengths[:, None]
+    heights = features[..., TOE_COLUMNS + 1]  # (B, F, 2)
+    height = torch.maximum(heights[:, 1:], heights[:, :-1]).clamp(0.0, CONTACT_HEIGHT)
+    weight = (2.0 - 2.0 ** (height / CONTACT_HEIGHT)) * inside[..., None]
+    away = (toe_steps(out) - toe_steps(features)) * 100.0
+    error = F.smooth_l1_loss(away, torch.zeros_like(away), reduction="none", beta=0.2).mean(dim=-1)
+    return (error * weight).sum() / (2 * mean_frames)
+
+
+def toe_steps(features: Tensor) -> Tensor:
+    """How far the toes move over the ground between frames, seen from the later frame's heading: rows [B, F, 67] in
+    metres and radians -> [B, F - 1, 2 toes, x and z] (the recovery of systems.md A1, one step of it)."""
+    turn = 2 * features[:, :-1, 0, None]  # (B, F - 1, 1): column 0 is half the yaw
+    x, z = features[..., TOE_COLUMNS], features[..., TOE_COLUMNS + 2]
+    before_x = x[:, :-1] * turn.cos() + z[:, :-1] * turn.sin()
+    before_z = z[:, :-1] * turn.cos() - x[:, :-1] * turn.sin()
+    root = features[:, :-1, 1:3]
+    return torch.stack([x[:, 1:] - before_x + root[..., :1], z[:, 1:] - before_z + root[..., 1:]], dim=-1)
 
 
 class RefitTask:
@@ -130,7 +164,7 @@ class RefitTask:
         device: torch.device,
     ) -> None:
         self.tokenizer = model
-        self.model = RefitStep(model, config, float(batches.normaliser.std[0]))
+        self.model = RefitStep(model, config, batches.normaliser)
         self.config = config
         self.bank = bank
         self.batches = batches
