@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from playground.errors import PlaygroundError
-from playground.generators.scalewise import Edit, redraw_masks
+from playground.generators.base import Edit, redraw_masks
 from playground.nn.sampling import Sampling, filter_logits
 from playground.runtime import Runtime
 from playground.systems import SamplingDefaults

@@ -14,7 +14,7 @@ from playground.results import Generation, GenerationStep
 from playground.systems import SamplingDefaults
 
 if TYPE_CHECKING:
-    from playground.generators.scalewise import Edit
+    from playground.generators.base import Edit
     from playground.runtime import Runtime
 
 

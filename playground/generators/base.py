@@ -1,32 +1,125 @@
 """The nouns of generation and what every generator can do (architecture: nouns and verbs)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, ClassVar, Protocol
 
+import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from playground.nn.sampling import Sampling
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
+from playground.tokenizers.quantizers import MultiScaleQuantizer
+
+
+@dataclass(frozen=True, eq=False)
+class TokenBatch:
+    """Tokens of a training batch.
+
+    noisy: what teacher forcing is fed with, some codes replaced by others; None: the tokens themselves. Networks that
+    corrupt or mask their input in another way do so themselves and do not read it.
+    """
+
+    ids: tuple[Tensor, ...]  # int64 [B, s_n] a level, padded with 0 on the right
+    masks: tuple[Tensor, ...]  # bool [B, s_n], which tokens are real
+    lengths: Tensor  # int64 [B], frames
+    text: TextFeatures
+    dropped: Tensor  # bool [B], no text
+    noisy: tuple[Tensor, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureBatch:
+    """Motions of a training batch, for generators without tokens."""
+
+    features: Tensor  # float32 [B, F, C] normalised, 0 beyond each length
+    lengths: Tensor  # int64 [B], frames
+    text: TextFeatures
+    dropped: Tensor  # bool [B], no text
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What one step of a generator gives."""
+    """What one step of a generator gives.
+
+    A step that finishes several levels at once holds their entropies and logits one after the other, coarse to fine. In
+    a batch of several lengths tokens are padded with 0 beyond each row's own.
+    """
 
     level: int  # number of levels drawn so far, from 1
     tokens: Tokens  # all levels drawn so far
     embedding: Tensor  # [B, T, D], the sum of their shares
-    entropy: Tensor  # [B, s_level] in bits, of the guided distribution that the level was drawn from
-    logits: Tensor  # [B, s_level, V], guided, before any filter
+    entropy: Tensor  # [B, s] in bits, of the guided distributions that the new levels were drawn from
+    logits: Tensor  # [B, s, V], guided, before any filter
+
+
+@dataclass(frozen=True, eq=False)
+class Edit:
+    """What a generation keeps: the source's tokens [1 or B, s_n] wherever redraw (bool [s_n] a level) is False."""
+
+    tokens: Tokens
+    redraw: tuple[Tensor, ...]
+
+    def mix(self, level: int, drawn: Tensor) -> Tensor:
+        """Drawn ids [B, s_n] with the kept positions put back."""
+        return torch.where(self.redraw[level], drawn, self.tokens.ids[level])
+
+
+def redraw_masks(keep: Tensor, sizes: Sequence[int], forced: int = 0) -> tuple[Tensor, ...]:
+    """Latents to keep (bool [T]) -> tokens to draw anew, bool [s_n] a level.
+
+    The mask is resized linearly, threshold 0.5 (A10); of the first `forced` scales nothing is drawn anew.
+    """
+    redraw = (~keep).float()[None, None]
+    masks = []
+    for level, size in enumerate(sizes):
+        here = redraw if len(keep) == size else F.interpolate(redraw, size, mode="linear", align_corners=False)
+        masks.append((here[0, 0] > 0.5) & (level >= forced))
+    return tuple(masks)
+
+
+class TokenNetwork(Protocol):
+    """A module that learns to draw tokens."""
+
+    config: Any
+
+    def training_loss(
+        self, batch: TokenBatch, quantizer: MultiScaleQuantizer, rng: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Loss, and the share of right arg-maxes among the predicted tokens; scalars. Draws come from `rng` alone."""
+        ...
+
+
+class FeatureNetwork(Protocol):
+    """A module that learns to make features without tokens."""
+
+    config: Any
+
+    def training_loss(self, batch: FeatureBatch, rng: torch.Generator) -> tuple[Tensor, Tensor]:
+        """Loss, and the mean squared error of the predicted motion; scalars. Draws come from `rng` alone."""
+        ...
 
 
 class Generator(Protocol):
-    """Text -> tokens."""
+    """Text -> tokens. `likelihood` says whether `score` and `logits` are there (LikelihoodGenerator)."""
 
-    def steps(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Iterator[Step]:
-        """Yield after every level. text None is free-form; lengths int64 [B] in frames."""
+    likelihood: ClassVar[bool]
+
+    @property
+    def quantizer(self) -> MultiScaleQuantizer:
+        """Of the tokenizer whose tokens it draws."""
+        ...
+
+    def steps(
+        self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling, edit: Edit | None = None
+    ) -> Iterator[Step]:
+        """Yield after every finished level. text None is free-form; lengths int64 [B] in frames."""
+        ...
+
+    def generate(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Step:
+        """The last step: all levels drawn."""
         ...
 
     def edit(
@@ -35,6 +128,28 @@ class Generator(Protocol):
         """Redraw the tokens where keep (bool [T] over the latents) is False."""
         ...
 
+
+class LikelihoodGenerator(Generator, Protocol):
+    """A generator that says how likely given tokens are."""
+
     def score(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
         """Log-probability [B, s_n] of every given token, one array a level, teacher-forced."""
+        ...
+
+    def logits(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
+        """Logits [B, s_n, V_n] of every level that those log-probabilities come from."""
+        ...
+
+
+class FeatureGenerator(Protocol):
+    """Text -> features, without tokens."""
+
+    def sample(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Tensor:
+        """Normalised features [B, F, C], 0 beyond each length. text None is free-form."""
+        ...
+
+    def steps_of(
+        self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling
+    ) -> Iterator[tuple[int, int, Tensor]]:
+        """After every denoising step: steps done, steps in all, and the motion as it is guessed so far [B, F, C]."""
         ...

@@ -4,14 +4,15 @@ Every scale is drawn at once, given all coarser scales: the running sum of the d
 next scale's length, is the input of that scale. The loop over scales is written once (`ScalewiseGenerator.steps`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from playground.generators.base import Step
+from playground.generators.base import Edit, Step, TokenBatch, redraw_masks
 from playground.limits import LIMITS
 from playground.nn.attention import CrossAttention, KeyValueCache, SelfAttention
 from playground.nn.blocks import SwiGLU
@@ -177,36 +178,21 @@ class ScalewiseTransformer(nn.Module):
         x = self.run(x, text, positions, on_device(self.pattern(), x.device))
         return [head(part) for head, part in zip(self.heads, x.split(self.config.scales, dim=1), strict=True)]
 
-
-@dataclass(frozen=True, eq=False)
-class Edit:
-    """What a generation keeps: the source's tokens [1 or B, s_n] wherever redraw (bool [s_n] a level) is False."""
-
-    tokens: Tokens
-    redraw: tuple[Tensor, ...]
-
-    def mix(self, level: int, drawn: Tensor) -> Tensor:
-        """Drawn ids [B, s_n] with the kept positions put back."""
-        return torch.where(self.redraw[level], drawn, self.tokens.ids[level])
-
-
-def redraw_masks(keep: Tensor, sizes: Sequence[int], forced: int = 0) -> tuple[Tensor, ...]:
-    """Latents to keep (bool [T]) -> tokens to draw anew, bool [s_n] a level.
-
-    The mask is resized linearly, threshold 0.5 (A10); of the first `forced` scales nothing is drawn anew.
-    """
-    redraw = (~keep).float()[None, None]
-    masks = []
-    for level, size in enumerate(sizes):
-        here = redraw if len(keep) == size else F.interpolate(redraw, size, mode="linear", align_corners=False)
-        masks.append((here[0, 0] > 0.5) & (level >= forced))
-    return tuple(masks)
+    def training_loss(
+        self, batch: TokenBatch, quantizer: MultiScaleQuantizer, rng: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Loss (A10) and share of right arg-maxes, fed with `batch.noisy`; draws nothing itself."""
+        noisy = batch.ids if batch.noisy is None else batch.noisy
+        with torch.no_grad(), torch.autocast(batch.lengths.device.type, enabled=False):
+            sums = list(quantizer.accumulate(noisy[:-1]))  # not through Tokens: its checks wait for a GPU
+        return generator_loss(self(sums, self.remember(batch.text, batch.lengths, dropped=batch.dropped)), batch.ids)
 
 
 @dataclass(frozen=True, eq=False)
 class ScalewiseGenerator:
     """The network with the quantizer whose tokens it draws; holds no state of a call."""
 
+    likelihood: ClassVar[bool] = True
     transformer: ScalewiseTransformer
     quantizer: MultiScaleQuantizer = field(repr=False)
 
@@ -275,6 +261,13 @@ class ScalewiseGenerator:
     def logits(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
         """Logits [B, s_n, V_n] of every level, given the true coarser ones, without guidance."""
         return self.transformer(running_sums(self.quantizer, tokens), self.transformer.remember(text, lengths))
+
+
+def generator_loss(logits: list[Tensor], ids: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+    """Mean cross-entropy of scales 1..N-1 plus that of scale N (A10), and the share of right arg-maxes; scalars."""
+    losses = [F.cross_entropy(part.flatten(0, 1).float(), i.flatten()) for part, i in zip(logits, ids, strict=True)]
+    right = [(part.argmax(dim=-1) == i).float().mean() for part, i in zip(logits, ids, strict=True)]
+    return torch.stack(losses[:-1]).mean() + losses[-1], torch.stack(right).mean()
 
 
 def running_sums(quantizer: MultiScaleQuantizer, tokens: Tokens) -> list[Tensor]:

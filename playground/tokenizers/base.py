@@ -2,13 +2,16 @@
 
 import json
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import torch
 from torch import Tensor
 
 from playground.errors import PlaygroundError
 from playground.text.encoders import TextFeatures
+
+if TYPE_CHECKING:
+    from playground.tokenizers.quantizers import MultiScaleQuantizer
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +77,41 @@ class Quantized:
     residual_norm: Tensor  # [N + 1, B], mean squared residual before the first level and after each one
 
 
+@dataclass(frozen=True, eq=False)
+class TrainingOutput:
+    """What one training step of a tokenizer needs."""
+
+    features: Tensor  # [B, F, C] reconstruction, zero beyond each length
+    commitment: Tensor  # scalar
+    ids: tuple[Tensor, ...]  # [B, s_n] a level
+
+
 class Tokenizer(Protocol):
-    """Features <-> tokens. Text may be None where a tokenizer does not use it."""
+    """Features <-> tokens. Text may be None where a tokenizer does not use it.
+
+    config states at least columns, heading, max_frames, scales (tokens a level at full length), codes, code_width and
+    latents (T at full length). In a batch of several lengths ids are padded with 0 on the right.
+    """
+
+    config: Any
+    quantizer: "MultiScaleQuantizer"
+
+    def sizes(self, frames: int) -> tuple[int, ...]:
+        """Tokens a level of a motion of so many frames."""
+        ...
 
     def encode(self, features: Tensor, lengths: Tensor, text: TextFeatures | None) -> Quantized:
         """features [B, F, C] normalised, lengths int64 [B] -> Quantized."""
         ...
 
-    def embed(self, tokens: Tokens, levels: int | None = None) -> Tensor:
-        """Tokens -> embedding [B, T, D]; levels=3 keeps the three coarsest."""
+    def latents(
+        self, features: Tensor, lengths: Tensor, text: TextFeatures | None, dropped: Tensor | None = None
+    ) -> Tensor:
+        """What is quantized: z [B, T, D]. Rows dropped (bool [B]) see no text."""
+        ...
+
+    def embed(self, tokens: Tokens, levels: int | None = None, lengths: Tensor | None = None) -> Tensor:
+        """Tokens -> embedding [B, T, D]; levels=3 keeps the three coarsest. lengths: frames, None: all full length."""
         ...
 
     def decode(
@@ -95,3 +124,23 @@ class Tokenizer(Protocol):
     ) -> Tensor:
         """Embedding [B, T, D] -> normalised features [B, F, C], zero beyond each length."""
         ...
+
+    def branches(self, embedding: Tensor, lengths: Tensor, text: TextFeatures | None) -> tuple[Tensor, Tensor]:
+        """The decodes with text and with the null text, [B, F, C] each; the same one twice where text changes none."""
+        ...
+
+    def detokenize(
+        self, embedding: Tensor, lengths: Tensor, text: TextFeatures | None, dropped: Tensor | None, frames: int
+    ) -> Tensor:
+        """The second half of a training pass: embedding [B, T, D] -> features [B, frames, C]."""
+        ...
+
+
+def level_masks(tokenizer: Tokenizer, lengths: Tensor) -> tuple[Tensor, ...]:
+    """Which tokens of a batch are real: lengths int64 [B] in frames -> bool [B, s_n of the longest] a level."""
+    sizes = [tokenizer.sizes(frames) for frames in lengths.tolist()]
+    counts = torch.tensor(sizes, device=lengths.device)  # (B, N)
+    return tuple(
+        torch.arange(max(level), device=lengths.device)[None] < counts[:, n, None]
+        for n, level in enumerate(zip(*sizes, strict=True))
+    )

@@ -20,7 +20,7 @@ from playground.nn.modules import WordTable
 from playground.nn.rope import Rotation, rope_angles
 from playground.nn.sequences import join_masks, put_before
 from playground.text.encoders import TextFeatures
-from playground.tokenizers.base import Quantized, Tokens
+from playground.tokenizers.base import Quantized, Tokens, TrainingOutput
 from playground.tokenizers.quantizers import MultiScaleQuantizer
 
 FULL_SCALES = (3, 6, 10, 15, 20, 25, 30, 36, 42, 49)  # 236 tokens
@@ -102,15 +102,6 @@ PRESETS: dict[str, TokenizerConfig] = {
         small_init=False, aligned=True,
     ),
 }  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class TrainingOutput:
-    """What one training step of the tokenizer needs."""
-
-    features: Tensor  # [B, F, C] reconstruction, zero beyond each length
-    commitment: Tensor  # scalar
-    ids: tuple[Tensor, ...]  # [B, s_n] a level
 
 
 def length_mask(lengths: Tensor, size: int) -> Tensor | None:
@@ -241,9 +232,13 @@ class LGTok(nn.Module):
         """features [B, F, C] normalised, lengths int64 [B] -> Quantized. text None tokenizes without language."""
         return self.quantizer.encode(self.latents(features, lengths, text))
 
+    def sizes(self, frames: int) -> tuple[int, ...]:
+        """Tokens a level: the same for every motion, `frames` change nothing."""
+        return self.config.scales
+
     @torch.no_grad()
-    def embed(self, tokens: Tokens, levels: int | None = None) -> Tensor:
-        """Tokens -> embedding [B, T, code width] of the coarsest `levels` scales."""
+    def embed(self, tokens: Tokens, levels: int | None = None, lengths: Tensor | None = None) -> Tensor:
+        """Tokens -> embedding [B, T, code width] of the coarsest `levels` scales; `lengths` change nothing."""
         return self.quantizer.embed(tokens, levels)
 
     # ---- detokenizer ----------------------------------------------------------------------------------------------

@@ -1,21 +1,20 @@
 """Training the scale-wise generator on the tokens of a frozen tokenizer (systems.md A10)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torch.nn import functional as F
 
 from playground.checkpoints import Card, save_checkpoint
 from playground.data.batches import BatchSource
-from playground.generators.scalewise import ScalewiseTransformer
+from playground.generators.base import TokenBatch, TokenNetwork
 from playground.nn.transfer import on_device
-from playground.text.encoders import TextEncoder, TextFeatures, identify
+from playground.text.encoders import TextEncoder, identify
 from playground.text.store import FeatureStore
 from playground.tokenizers.quantizers import MultiScaleQuantizer
 from playground.tokenizers.transformer import LGTok
@@ -64,36 +63,22 @@ def build_bank(
 class GeneratorInputs:
     """One training batch on the device. Not a dataclass: Fabric would round its numbers to half precision."""
 
-    def __init__(self, ids: tuple[Tensor, ...], noisy: tuple[Tensor, ...], lengths: Tensor) -> None:
-        self.ids = ids  # clean targets, [B, s_n] a level
-        self.noisy = noisy  # inputs, some ids replaced
-        self.lengths = lengths  # int64 [B]
-        self.text: TextFeatures
-        self.dropped: Tensor  # bool [B], no text
-
-
-def generator_loss(logits: list[Tensor], ids: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
-    """Mean cross-entropy of scales 1..N-1 plus that of scale N (A10), and the share of right arg-maxes; scalars."""
-    losses = [F.cross_entropy(part.flatten(0, 1).float(), i.flatten()) for part, i in zip(logits, ids, strict=True)]
-    right = [(part.argmax(dim=-1) == i).float().mean() for part, i in zip(logits, ids, strict=True)]
-    return torch.stack(losses[:-1]).mean() + losses[-1], torch.stack(right).mean()
+    def __init__(self, batch: TokenBatch, rng: torch.Generator) -> None:
+        self.batch = batch
+        self.rng = rng  # what the network draws from
 
 
 class GeneratorStep(nn.Module):
     """One training pass, loss included: what Fabric wraps."""
 
-    def __init__(self, transformer: ScalewiseTransformer, quantizer: MultiScaleQuantizer) -> None:
+    def __init__(self, transformer: TokenNetwork, quantizer: MultiScaleQuantizer) -> None:
         super().__init__()
         self.transformer = transformer
         self._quantizer = [quantizer]  # in a list: frozen, not a part of what is trained
 
-    def forward(self, batch: GeneratorInputs) -> tuple[Tensor, Tensor]:
+    def forward(self, inputs: GeneratorInputs) -> tuple[Tensor, Tensor]:
         """A batch -> loss, share of right arg-maxes; scalars."""
-        quantizer = self._quantizer[0]
-        with torch.no_grad(), torch.autocast(batch.lengths.device.type, enabled=False):
-            sums = list(quantizer.accumulate(batch.noisy[:-1]))  # not through Tokens: its checks wait for a GPU
-        memory = self.transformer.remember(batch.text, batch.lengths, dropped=batch.dropped)
-        return generator_loss(self.transformer(sums, memory), batch.ids)
+        return self.transformer.training_loss(inputs.batch, self._quantizer[0], inputs.rng)
 
 
 class GeneratorTask:
@@ -101,7 +86,7 @@ class GeneratorTask:
 
     def __init__(
         self,
-        transformer: ScalewiseTransformer,
+        transformer: TokenNetwork,
         quantizer: MultiScaleQuantizer,
         config: GeneratorTraining,
         bank: TokenBank,
@@ -128,12 +113,12 @@ class GeneratorTask:
         """[B, sum of scales] on the device, one tensor a level."""
         return on_device(values, self.device).split(self.quantizer.scales, dim=1)
 
-    def _batch(self, bank: TokenBank, rows: NDArray[np.int64]) -> GeneratorInputs:
+    def _batch(self, bank: TokenBank, rows: NDArray[np.int64]) -> TokenBatch:
         ids = self._levels(bank.ids[rows].astype(np.int64))
-        inputs = GeneratorInputs(ids, ids, on_device(bank.lengths[rows], self.device))
-        inputs.text = self.texts.lookup([bank.captions[row] for row in rows])
-        inputs.dropped = torch.zeros(len(rows), dtype=torch.bool, device=self.device)
-        return inputs
+        masks = tuple(torch.ones_like(level, dtype=torch.bool) for level in ids)
+        text = self.texts.lookup([bank.captions[row] for row in rows])
+        dropped = torch.zeros(len(rows), dtype=torch.bool, device=self.device)
+        return TokenBatch(ids, masks, on_device(bank.lengths[rows], self.device), text, dropped)
 
     def loss(self, model: nn.Module, step: int, rank: int, world: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of the batch of `step`; draw, caption drop and token noise are functions of (seed, step)."""
@@ -145,10 +130,14 @@ class GeneratorTask:
         keep = rng.random((c.size, len(codes))) < c.keep
         other = rng.integers(0, codes, (c.size, len(codes)))
         batch = self._batch(self.bank, rows[rank::world])
-        batch.dropped = on_device(dropped[rank::world].copy(), self.device)
         mixed = (batch.ids, self._levels(keep[rank::world].copy()), self._levels(other[rank::world].copy()))
-        batch.noisy = tuple(torch.where(kept, ids, random) for ids, kept, random in zip(*mixed, strict=True))
-        loss, right = model(batch)
+        batch = replace(
+            batch,
+            dropped=on_device(dropped[rank::world].copy(), self.device),
+            noisy=tuple(torch.where(kept, ids, random) for ids, kept, random in zip(*mixed, strict=True)),
+        )
+        own = torch.Generator().manual_seed(int(rng.integers(2**62)) + rank)
+        loss, right = model(GeneratorInputs(batch, own))
         return loss, {"right": right}
 
     @torch.no_grad()
@@ -159,7 +148,8 @@ class GeneratorTask:
         losses, rights, counts = [], [], []
         for start in range(0, len(self.held_out.lengths), self.config.size):
             rows = np.arange(start, min(start + self.config.size, len(self.held_out.lengths)))
-            loss, right = self.model(self._batch(self.held_out, rows))
+            rng = torch.Generator().manual_seed(start)  # the same draws at every validation
+            loss, right = self.model(GeneratorInputs(self._batch(self.held_out, rows), rng))
             losses.append(float(loss))
             rights.append(float(right))
             counts.append(len(rows))
@@ -172,4 +162,4 @@ class GeneratorTask:
         """Write the shipped form of the generator; it names the tokenizer whose tokens it draws."""
         facts = facts | {"seed": self.config.seed, "tokenizer": self.tokenizer_hash}
         card = Card("generator", self.transformer.config, identify(self.encoder), self.data, facts)
-        save_checkpoint(path, self.transformer, card)
+        save_checkpoint(path, cast(nn.Module, self.transformer), card)

@@ -5,7 +5,8 @@ import torch
 from torch.nn import functional as F
 
 from playground.errors import PlaygroundError
-from playground.generators.scalewise import Edit, redraw_masks, running_sums
+from playground.generators.base import Edit, redraw_masks
+from playground.generators.scalewise import running_sums
 from playground.nn.sampling import Sampling
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
