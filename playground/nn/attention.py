@@ -1,4 +1,4 @@
-"""Multi-head attention: self-attention with rotary positions and an optional cache, and cross-attention to a memory.
+"""Multi-head attention: self-attention with rotary or relative positions and a cache, cross-attention to a memory.
 
 Masks are boolean, True where a key is real, [B, S], or None when every key is real. The cache belongs to a call, never
 to a layer (habit after nanochat's KVCache and torchtune's kv_cache).
@@ -55,19 +55,36 @@ def split_heads(x: Tensor, heads: int) -> Tensor:
 
 
 def attend(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, dropout: float) -> Tensor:
-    """Softmax attention on [B, H, T, head width], scale 1/sqrt(head width) -> [B, T, D]."""
-    if mask is not None and mask.ndim == 2:  # keys [B, S]; a pattern comes as [1, 1, T, S]
+    """Softmax attention on [B, H, T, head width], scale 1/sqrt(head width) -> [B, T, D].
+
+    mask: see above; a pattern of real numbers is added to the scaled scores.
+    """
+    if mask is not None and mask.ndim == 2:  # keys [B, S]; a pattern comes as [1 or B, 1, T, S]
         mask = mask[:, None, None, :]
     out = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=dropout)
     return out.transpose(1, 2).flatten(-2)
 
 
 def attention_weights(query: Tensor, key: Tensor, mask: Tensor | None) -> Tensor:
-    """What `attend` multiplies the values with: [B, H, T, head width] twice, key mask [B, S] -> [B, H, T, S]."""
+    """What `attend` multiplies the values with: [B, H, T, head width] twice, its mask -> [B, H, T, S]."""
     score = query @ key.transpose(-2, -1) / query.shape[-1] ** 0.5
     if mask is not None:
-        score = score.masked_fill(~mask[:, None, None, :], float("-inf"))
+        score = score.masked_fill(~(mask if mask.ndim == 4 else mask[:, None, None, :]), float("-inf"))
     return score.softmax(dim=-1)
+
+
+def prefix_pattern(real: Tensor, steps: int, *, causal_prefix: bool = False) -> Tensor:
+    """Who sees whom in a prefix followed by a causal part: real bool [B, P], number of steps -> bool [B, 1, S, S].
+
+    The real positions of the prefix see each other, whatever the order (with causal_prefix those before them alone),
+    and nothing of the steps; a step sees the real prefix, the steps before it and itself. Everyone sees itself.
+    """
+    places = torch.arange(real.shape[1] + steps, device=real.device)
+    seen = places[None, :] <= places[:, None]
+    if not causal_prefix:
+        seen = seen | ((places < real.shape[1])[None, :] & (places < real.shape[1])[:, None])
+    keys = torch.cat([real, real.new_ones(len(real), steps)], dim=1)
+    return (seen & keys[:, None, :] | (places[None, :] == places[:, None]))[:, None]
 
 
 class SelfAttention(nn.Module):
@@ -88,14 +105,56 @@ class SelfAttention(nn.Module):
         mask: Tensor | None = None,
         cache: KeyValueCache | None = None,
         layer: int = 0,
+        record: list[Tensor] | None = None,
     ) -> Tensor:
-        """x [B, T, D] -> [B, T, D]. mask: [B, S] keys, or [1, 1, T, S] pattern."""
+        """x [B, T, D] -> [B, T, D]. mask: [B, S] keys, or [1 or B, 1, T, S] pattern.
+
+        record: where given, the attention weights [B, H, T, S] are appended to it.
+        """
         query, key, value = (split_heads(part, self.heads) for part in self.qkv(x).chunk(3, dim=-1))
         if rotation is not None:
             query, key = apply_rope(query, rotation), apply_rope(key, rotation)
         if cache is not None:
             key, value = cache.extend(layer, key, value)
+        if record is not None:
+            record.append(attention_weights(query, key, mask))
         return self.out(attend(query, key, value, mask, self.dropout if self.training else 0.0))
+
+
+class RelativeAttention(nn.Module):
+    """Causal multi-head self-attention with learned relative positions (Transformer-XL's score; systems.md C2).
+
+    Query i and key j <= i score (q_i k_j + q_i R(i-j) + u k_j + v R(i-j)) / sqrt(head width). R is a table of a vector
+    a distance and head; distances beyond `reach` count as `reach`. The head width is width // heads, which need not
+    divide: the inner width is their product.
+    """
+
+    def __init__(self, width: int, heads: int, reach: int, *, dropout: float = 0.0) -> None:
+        super().__init__()
+        self.heads = heads
+        self.dropout = dropout
+        size = width // heads
+        self.qkv = Linear(width, 3 * heads * size)
+        self.out = Linear(heads * size, width)
+        self.distances = nn.Parameter(torch.empty(heads, reach + 1, size))  # R
+        self.key_bias = nn.Parameter(torch.zeros(heads, 1, size))  # u
+        self.distance_bias = nn.Parameter(torch.zeros(heads, 1, size))  # v
+        nn.init.normal_(self.distances, std=0.02)
+
+    def forward(self, x: Tensor, *, cache: KeyValueCache | None = None, layer: int = 0) -> Tensor:
+        """x [B, T, D] -> [B, T, D]; with a cache x continues what the cache has seen."""
+        query, key, value = (split_heads(part, self.heads) for part in self.qkv(x).chunk(3, dim=-1))
+        if cache is not None:
+            key, value = cache.extend(layer, key, value)
+        steps, seen = query.shape[2], key.shape[2]
+        places = torch.arange(seen, device=x.device)
+        gap = places[seen - steps :, None] - places[None, :]  # (T, S)
+        by_distance = (query + self.distance_bias) @ self.distances.transpose(-2, -1)  # (B, H, T, reach + 1)
+        index = gap.clamp(0, self.distances.shape[1] - 1).expand(*query.shape[:2], -1, -1)
+        bias = by_distance.gather(-1, index) / query.shape[-1] ** 0.5
+        bias = bias.masked_fill(gap < 0, float("-inf")).to(value.dtype)
+        query = (query + self.key_bias).to(value.dtype)
+        return self.out(attend(query, key, value, bias, self.dropout if self.training else 0.0))
 
 
 class CrossAttention(nn.Module):

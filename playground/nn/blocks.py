@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from playground.nn.attention import CrossAttention, Memory, SelfAttention
+from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention
 from playground.nn.linear import Linear
 from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
@@ -68,11 +68,19 @@ class Block(nn.Module):
     def _drop(self, x: Tensor) -> Tensor:
         return F.dropout(x, self.dropout, self.training)
 
-    def attend_self(self, x: Tensor, rotation: Rotation | None, mask: Tensor | None) -> Tensor:
-        """The self-attention sub-layer with its residual and norm, x [B, T, D]."""
-        if self.pre:
-            return x + self._drop(self.self_attention(self.norms[0](x), rotation=rotation, mask=mask))
-        return self.norms[0](x + self._drop(self.self_attention(x, rotation=rotation, mask=mask)))
+    def attend_self(
+        self,
+        x: Tensor,
+        rotation: Rotation | None,
+        mask: Tensor | None,
+        cache: KeyValueCache | None = None,
+        layer: int = 0,
+        record: list[Tensor] | None = None,
+    ) -> Tensor:
+        """The self-attention sub-layer with its residual and norm, x [B, T, D]; arguments as in SelfAttention."""
+        inner = self.norms[0](x) if self.pre else x
+        out = self.self_attention(inner, rotation=rotation, mask=mask, cache=cache, layer=layer, record=record)
+        return x + self._drop(out) if self.pre else self.norms[0](x + self._drop(out))
 
     def attend_memory(self, x: Tensor, index: int, memory: Memory) -> Tensor:
         """Cross-attention number `index` with its residual and norm, x [B, T, D]."""
