@@ -1,5 +1,6 @@
-"""Drawing codes from logits: guidance, top-k share, nucleus, temperature. Randomness is an argument."""
+"""Drawing codes from logits: guidance, top-k share, nucleus, temperature, Gumbel. Randomness is an argument."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -65,3 +66,38 @@ def entropy_bits(logits: Tensor) -> Tensor:
     """Entropy [B, s] in bits of the distributions given by logits [B, s, V]."""
     log = logits.float().log_softmax(dim=-1)
     return -(log.exp() * log).sum(dim=-1) / torch.log(torch.tensor(2.0))
+
+
+def top_share(logits: Tensor, share: float) -> Tensor:
+    """Set all but the largest ceil(V * share) logits (at least one) to -inf; [..., V] (MoMask, B2)."""
+    size = logits.shape[-1]
+    count = max(1, min(size, math.ceil(size * share - 1e-9)))
+    best = logits.topk(count, dim=-1)
+    return torch.full_like(logits, float("-inf")).scatter_(-1, best.indices, best.values)
+
+
+def gumbel_draw(
+    logits: Tensor,
+    temperature: float,
+    rng: torch.Generator | Sequence[torch.Generator],
+    real: Tensor | None = None,
+) -> Tensor:
+    """Codes [B, s]: arg max of logits [B, s, V] / temperature plus Gumbel noise; the plain arg max at temperature 0.
+
+    With one rng or one a row. real (bool [B, s]): noise is drawn for these positions alone, so that padding changes no
+    draw. On the CPU, so a seed means the same everywhere.
+    """
+    if temperature <= 0:
+        return logits.argmax(dim=-1)
+    rows = [rng] * len(logits) if isinstance(rng, torch.Generator) else rng
+    score = logits.float().cpu() / temperature
+    for row, one in zip(range(len(score)), rows, strict=True):
+        here = torch.ones(score.shape[1], dtype=torch.bool) if real is None else real[row].cpu()
+        chance = torch.rand(int(here.sum()), score.shape[2], generator=one).clamp(min=1e-12)
+        score[row, here] -= (-chance.log()).log()
+    return score.argmax(dim=-1).to(logits.device)
+
+
+def confidence(logits: Tensor, ids: Tensor) -> Tensor:
+    """Probability [B, s] of codes [B, s] under unfiltered logits [B, s, V] at temperature 1."""
+    return logits.float().softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
