@@ -14,6 +14,7 @@ from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.ui.comparing import MOTION, VARIATIONS, Setting
 from playground.ui.drawing import MADE, Change, Wish, read_changes, read_name
+from playground.ui.placing import SECONDS, SEED
 from playground.ui.state import OWN_FILE, Scales, State, Token, controls_of
 
 _SLIDES = """
@@ -130,14 +131,26 @@ def _embedding_map(state: State) -> tuple[str, str]:
 
 
 def _placed(state: State) -> str:
-    """A new point on the maps, where one was placed."""
-    if not state["place"]:
+    """A new point on the maps, where one was placed: an example, the visitor's own file or a generation."""
+    system, words, wanted = _literal(state.system), state["prompt"], str(state["place"] or "")
+    if words:
+        made = f"new = engine.generate({_literal(words)}, {_number(SECONDS)}, system={system}, seed={SEED})\n"
+    elif wanted.startswith(OWN_FILE):
+        made = (
+            "from pathlib import Path\n\nfrom playground.motion.formats import read_motion\n\n"
+            f"mine = read_motion(Path({_literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n"
+            f"new = engine.tokenize(mine.slice(0, {LIMITS.max_frames + 1}), mine.caption, system={system})\n"
+        )
+    elif wanted:
+        made = (
+            f"(example,) = [one for one in engine.examples() if one.id == {_literal(wanted)}]\n"
+            f"new = engine.tokenize(example.motion().slice(0, {LIMITS.max_frames + 1}), example.caption, "
+            f"system={system})\n"
+        )
+    else:
         return ""
     return (
-        "\nengine = default_engine()\n"
-        f"(example,) = [one for one in engine.examples() if one.id == {_literal(state['place'])}]\n"
-        f"new = engine.tokenize(example.motion().slice(0, {LIMITS.max_frames + 1}), example.caption, "
-        f"system={_literal(state.system)})\nplaced = engine.place(new)\n"
+        f"\nengine = default_engine()\n{made}placed = engine.place(new)\n"
         'print("placed at t-SNE", *placed.tsne, " PCA", *placed.pca, " nearest:", *placed.nearest[:4])\n'
     )
 

@@ -77,6 +77,7 @@ CONTROLS: tuple[Control, ...] = (
             choices=("action", "scale", "time", "length", "source")),
     Control("map", "embedding-map", "choice", "tsne", "Map", choices=("tsne", "pca"), element="embedding-kind"),
     Control("place", "embedding-map", "name", None, "An example as a new point", element="embedding-place"),
+    Control("prompt", "embedding-map", "text", None, "A prompt as a new point", 1, _PROMPT, element="embedding-prompt"),
     Control("system", "codebooks", "systems", None, "System", element="codebooks-system"),
     Control("order", "codebooks", "choice", "sorted", "Order of the codes", choices=("sorted", "index"),
             element="codebooks-order"),

@@ -137,8 +137,20 @@ def test_a_group_that_is_none_is_refused(do: embedding.Handlers, group: object, 
 
 def test_a_link_shows_points_colour_and_a_new_point(do: embedding.Handlers) -> None:
     query = "?room=embedding-map&each=token&colour=scale&motion=c5&place=m1"
-    systems, each, kind, held, plot, colour, *_, current = do.arrive(None, event(query=query))
+    systems, each, kind, held, plot, colour, *_, current, prompt = do.arrive(None, event(query=query))
     assert (systems, each, kind, colour["value"], current) == (["lgtok-lite"], "token", "tsne", "scale", "c5")
+    assert prompt == ""
     assert held.guest is not None and '"yours"' in plot
     broken = do.arrive(None, event(query="?room=embedding-map&colour=time&motion=nobody&place=nobody"))
     assert broken[5]["value"] == "action" and broken[3].guest is None
+
+
+def test_a_link_places_what_a_prompt_makes(do: embedding.Handlers) -> None:
+    *_, prompt = shown = do.arrive(None, event(query="?room=embedding-map&prompt=a+person+%22bows%22&place=m1"))
+    assert prompt == 'a person "bows"' and shown[3].guest.title == '“a person "bows"”, generated'
+    assert '"yours"' in shown[4] and "placed in the map" in shown[8]
+
+
+def test_a_link_with_somebody_elses_file_says_so(do: embedding.Handlers) -> None:
+    shown = do.arrive(None, event(query="?room=embedding-map&place=file%3Amy+walk.npz"))
+    assert shown[3].guest is None and "my walk.npz" in shown[8].text

@@ -13,7 +13,7 @@ from playground.errors import PlaygroundError
 from playground.figures import stage as scene
 from playground.limits import LIMITS
 from playground.ui.cards import term
-from playground.ui.errors import attach
+from playground.ui.errors import Noted, attach
 from playground.ui.facts import Fact
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
@@ -22,6 +22,7 @@ from playground.ui.mapviews import FORGET, FREE, KEEP_GROUP, RING, SAVE, SELECT,
 from playground.ui.placing import Guest, generated_guest, guest_of, guest_scene
 from playground.ui.scenes import score, token_facts
 from playground.ui.services import Services
+from playground.ui.state import OWN_FILE
 from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
 
@@ -190,12 +191,15 @@ class Handlers:
         wanted = wanted if wanted in bundle.ids else bundle.clips[first_clip(bundle)].id
         drawn = self.draw(systems, state["each"], state["colour"], state["map"], wanted, held)
         kept = [systems, state["each"], state["map"], *drawn, *self.put(wanted, systems)]
-        known = {example.id for example in self.services.examples()}
-        if state["place"] not in known:
-            return tuple(kept)
         settings = (systems, state["each"], state["colour"], state["map"], wanted, kept[3])
-        kept[3], kept[4], *kept[8:11] = self.place_example(state["place"], *settings)
-        return tuple(kept)
+        known, own = {example.id for example in self.services.examples()}, str(state["place"] or "")
+        if state["prompt"]:
+            kept[3], kept[4], *kept[8:11] = self.place_prompt(state["prompt"], *settings)
+        elif own in known:
+            kept[3], kept[4], *kept[8:11] = self.place_example(own, *settings)
+        elif own.startswith(OWN_FILE):
+            kept[8] = Noted(kept[8], f"The point placed here was its maker's own, {own.removeprefix(OWN_FILE)}.")
+        return *kept, state["prompt"] or ""
 
     def _maps(self, held: Session, shown: Shown, bundles: list[Bundle], current: str) -> str:
         placed = held.guest.on(self.services, shown.systems, shown.each) if held.guest else {}
@@ -253,13 +257,16 @@ def _bind(do: Handlers, views: Views, session: gr.State, stage: gr.HTML, door: g
         attach(event, do.place_prompt, [views.prompt, *settings], placed, **placing)
     saved = attach(views.csv.click, do.csv, [views.system, views.each], [views.text], model=False, **how)
     saved.then(None, [views.text], None, js=SAVE, api_visibility="private")
-    arrival(door, do.arrive, [session], [views.system, views.each, views.map, *drawn, *shown], room=NAME, **busy)
+    everything = [views.system, views.each, views.map, *drawn, *shown, views.prompt]
+    arrival(door, do.arrive, [session], everything, room=NAME, **busy)
     commits(NAME, {"motion": views.current}, views.current.change, forget=("selection",))
     commits(NAME, {"system": views.system}, views.system.input)
     commits(NAME, {"each": views.each}, views.each.input)
     commits(NAME, {"colour": views.colour}, views.colour.change)
     commits(NAME, {"map": views.map}, views.map.input)
-    commits(NAME, {"place": views.example}, views.example.input, forget=("selection",))
+    commits(NAME, {"place": views.example}, views.example.input, forget=("prompt", "selection"))
+    commits(NAME, {"place": views.upload}, views.upload.upload, forget=("prompt", "selection"))
+    commits(NAME, {"prompt": views.prompt}, views.go.click, views.prompt.submit, forget=("place", "selection"))
 
 
 def _listed(bundle: Bundle, rows: Sequence[int]) -> list[tuple[str, str]]:
