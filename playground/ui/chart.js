@@ -140,6 +140,12 @@
       if (event.detail.forget) groups.clear();
       redraw();
     });
+    const figure = element.querySelector('.mtp-figure'); // one that scrolls sideways can be reached by keyboard
+    const reachable = () => {
+      if (figure.scrollWidth > figure.clientWidth + 1) figure.tabIndex = 0;
+      else figure.removeAttribute('tabindex');
+    };
+    new ResizeObserver(reachable).observe(figure);
     let width = 0; // the observer also speaks once at the start, and when a hidden tab is opened
     new ResizeObserver(() => {
       if (box.clientWidth === width) return;

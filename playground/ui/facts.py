@@ -85,7 +85,9 @@ def table(header: list[str], rows: list[list[str]], caption: str) -> str:
         + "</tr>"
         for row in rows
     )  # fmt: skip
+    told = html.escape(caption, quote=True)
     return (
-        f'<div class="mtp-table-box"><table class="mtp-table"><caption>{html.escape(caption)}</caption>'
+        f'<div class="mtp-table-box" role="group" tabindex="0" aria-label="{told}">'  # scrolls sideways by keyboard too
+        f'<table class="mtp-table"><caption>{told}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )

@@ -1,6 +1,7 @@
 """Fixtures of the browser tests: one Chromium, a visit that keeps what the page asked for and complained about."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,6 +35,10 @@ class Visit:
             count = len(self.requests)
             self.page.wait_for_timeout(500)
 
+    def drawn(self) -> None:
+        """Wait until the page has drawn two frames: what was typed has then reached its control."""
+        self.page.evaluate("() => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))")
+
     def sent_since(self, mark: int) -> list[str]:
         """Requests that went out after the list had `mark` entries, streams that stay open left aside."""
         return [url for url in self.requests[mark:] if "heartbeat" not in url]
@@ -51,9 +56,9 @@ def browser() -> Iterator[Browser]:
         running.close()
 
 
-@pytest.fixture
-def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
-    """visit(address, **context settings) opens a fresh profile on an address and waits until the page stands.
+@contextmanager
+def visiting(browser: Browser) -> Iterator[Callable[..., Visit]]:
+    """go(address, **context settings) opens a fresh profile on an address and waits until the page stands.
 
     Visitors ask for reduced motion unless told otherwise: figures then stand still until played, which spares the test
     machine."""
@@ -71,9 +76,18 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
         expect(made.page.get_by_role("tab", name="Tokenize", exact=True)).to_be_visible()
         return made
 
-    yield go
-    for context in contexts:
-        context.close()
+    try:
+        yield go
+    finally:
+        for context in contexts:
+            context.close()
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+    """`visiting`, for one test."""
+    with visiting(browser) as go:
+        yield go
 
 
 @pytest.fixture(scope="session")
