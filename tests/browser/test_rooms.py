@@ -150,9 +150,7 @@ def test_a_bad_prompt_gives_one_sentence_and_the_last_result_stays(seen: Visit, 
     before = facts(page, "generate").inner_text()
     seen.settle()
     box = page.locator("#generate-prompt textarea")
-    box.fill("somebody hops")  # a page that is still waking up may put its own words back once
-    expect(box).to_have_value("somebody hops")
-    page.wait_for_timeout(1_000)
+    seen.type(box, "somebody hops")
     box.fill(prompt)
     expect(box).to_have_value(prompt)
     page.locator("#generate-go").click()
@@ -166,7 +164,7 @@ def test_a_motion_appears_scale_by_scale(seen: Visit) -> None:
     expect(page.locator("#generate-score .ms-heads")).to_contain_text("116 tokens in 10 scales")
     seen.settle()
     page.evaluate(WATCH_LABELS)
-    page.locator("#generate-prompt textarea").fill("a person sits down")
+    seen.type(page.locator("#generate-prompt textarea"), "a person sits down")
     page.locator("#generate-go").click()
     label = page.locator("#generate-stage .ms-labels")
     expect(label).to_contain_text("of 10")
@@ -197,7 +195,7 @@ def test_the_guidance_slider_moves_the_figure_and_asks_nobody(seen: Visit) -> No
     for words in ("g = 0", "g = 1", "g = 2", "g = 3", "g = 4"):
         expect(page.locator("#guidance-stage .ms-labels")).to_contain_text(words)
     joints = "() => Array.from(MotionStage.get('guidance').joints('live')).slice(0, 3000)"
-    page.wait_for_function("() => window.MotionStage?.get('guidance')?.joints('live')")
+    page.wait_for_function("() => window.MotionStage?.get('guidance')?.joints('live') && window.Plotly")
     seen.settle()
     before, mark = np.array(page.evaluate(joints)), len(seen.requests)
     slider = page.locator("#guidance-g input[type=range]")
