@@ -1,12 +1,14 @@
 """Vector quantization: the one nearest-code lookup, EMA codebooks, the multi-scale residual quantizer (systems.md A6).
 
 With equal scales as long as the latents, phi "identity" and the Euclidean metric it is MoMask's plain residual
-quantizer (A11, B1); noisy look-ups (`draw`) and kept prefixes (`level_drop`) are for that one.
+quantizer (A11, B1); noisy look-ups (`draw`) and kept prefixes (`level_drop`) are for that one. `shared` is MoMask++'s
+single codebook (E3), `affine` with `penalties` MOGO's MoSA-VQ (C1); `divisors` count tokens from each motion's length.
 Ideas: VAR's multi-scale residual quantizer (MIT), EMA codebooks of VQ-VAE-2 and encodec (MIT); code written here.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -14,7 +16,10 @@ from torch.nn import functional as F
 
 from playground.nn.linear import Conv3
 from playground.nn.modules import module_list
+from playground.tokenizers.affine import OUTER, Affine, Penalties, cross_covariance
 from playground.tokenizers.base import Quantized, Tokens
+from playground.tokenizers.grids import CountedGrid, FixedGrid, Grid
+from playground.tokenizers.grids import resample_down as resample_down
 
 PHIS = ("conv", "residual", "identity")
 METRICS = ("cosine", "euclidean")
@@ -39,18 +44,6 @@ def nearest_code(vectors: Tensor, codebook: Tensor, metric: str, temperature: fl
     return score.argmax(dim=-1)
 
 
-def resample_down(x: Tensor, size: int) -> Tensor:
-    """Area pooling along time: [B, T, D] -> [B, size, D]."""
-    return x if x.shape[1] == size else F.adaptive_avg_pool1d(x.transpose(1, 2), size).transpose(1, 2)
-
-
-def resample_up(x: Tensor, size: int) -> Tensor:
-    """Linear interpolation along time, corners not aligned: [B, s, D] -> [B, size, D]."""
-    if x.shape[1] == size:
-        return x
-    return F.interpolate(x.transpose(1, 2), size, mode="linear", align_corners=False).transpose(1, 2)
-
-
 def _distributed() -> bool:
     return torch.distributed.is_available() and torch.distributed.is_initialized()
 
@@ -66,10 +59,11 @@ def _from_first_process(x: Tensor) -> Tensor:
 class Codebook(nn.Module):
     """V code vectors of width D learned as moving averages (decay 0.99) of the vectors that choose them."""
 
-    def __init__(self, codes: int, width: int, *, metric: str, decay: float = 0.99) -> None:
+    def __init__(self, codes: int, width: int, *, metric: str, decay: float = 0.99, enough: int = 0) -> None:
         super().__init__()
         self.metric = metric
         self.decay = decay
+        self.enough = enough  # codes restart only from batches of more than so many vectors a code (E3)
         self.vectors: Tensor
         self.sums: Tensor
         self.counts: Tensor
@@ -98,18 +92,49 @@ class Codebook(nn.Module):
 
     @torch.no_grad()
     def learn(self, vectors: Tensor, ids: Tensor) -> None:
-        """One EMA step on vectors [n, D] with their codes [n]; codes counted below 1 restart from the batch."""
+        """One EMA step on vectors [n, D] with their codes [n]; codes counted below 1 restart from the batch.
+
+        From a batch that is too small for that (`enough`) they do not, but go on as averages.
+        """
         counts = torch.zeros_like(self.counts).index_add_(0, ids, torch.ones_like(vectors[:, 0]))
         sums = torch.zeros_like(self.sums).index_add_(0, ids, vectors)
         if _distributed():
             torch.distributed.all_reduce(counts)
             torch.distributed.all_reduce(sums)
+        if self.enough and float(counts.sum()) <= self.enough * len(counts):
+            self._average(counts, sums)
+            return
         self.counts.lerp_(counts, 1 - self.decay)
         self.sums.lerp_(sums, 1 - self.decay)
         alive = (self.counts >= 1.0)[:, None]
         average = self.sums / self.counts.clamp(min=1e-5)[:, None]
         spare = _from_first_process(self.fill(vectors))
         self.vectors.copy_(torch.where(alive, average, spare))
+
+    def _average(self, counts: Tensor, sums: Tensor) -> None:
+        self.counts.lerp_(counts, 1 - self.decay)
+        self.sums.lerp_(sums, 1 - self.decay)
+        known = (self.counts >= 1e-5)[:, None]
+        self.vectors.copy_(torch.where(known, self.sums / self.counts.clamp(min=1e-5)[:, None], self.vectors))
+
+
+class SharedCodebook(nn.ModuleList):
+    """One codebook that every level calls its own, stored once."""
+
+    def __init__(self, book: Codebook, levels: int) -> None:
+        super().__init__()
+        self.add_module("0", book)
+        self.levels = levels
+
+    def __len__(self) -> int:
+        return self.levels
+
+    def __iter__(self) -> Iterator[nn.Module]:
+        return (self[level] for level in range(self.levels))
+
+    def __getitem__(self, level: int) -> nn.Module:  # type: ignore[override]
+        range(self.levels)[level]  # IndexError beyond the last level, as in any list
+        return self.get_submodule("0")
 
 
 class Phi(nn.Module):
@@ -152,6 +177,12 @@ class MultiScaleQuantizer(nn.Module):
 
     In training, codes are drawn with Gumbel noise of temperature `draw`, and a share `level_drop` of the steps uses a
     random prefix of the levels only, from 1 to all (B1); both are 0 in LG-Tok.
+
+    scales: tokens a level at full length. With divisors, a motion of T latents has max(1, T // divisor) of them on a
+    level, calls take the number of latents of each row (int64 [B]), and nothing beyond a row's own counts.
+    shared: all levels look up in one codebook, which learns from the tokens of all levels together (E3); `enough` is
+    its rule for restarting codes. affine: every level looks up W r + b and adds W^-1 (q - b) (C1). penalties: C1's
+    loss in the place of A6's.
     """
 
     def __init__(
@@ -164,22 +195,38 @@ class MultiScaleQuantizer(nn.Module):
         phi: str = "conv",
         draw: float = 0.0,
         level_drop: float = 0.0,
+        divisors: Sequence[int] | None = None,
+        shared: bool = False,
+        enough: int = 0,
+        affine: bool = False,
+        penalties: Penalties | None = None,
     ) -> None:
         super().__init__()
         if len(scales) != len(codes):
             raise ValueError(f"{len(scales)} scales need as many codebook sizes, got {len(codes)}")
+        if divisors is not None and len(divisors) != len(scales):
+            raise ValueError(f"{len(scales)} scales need as many divisors, got {len(divisors)}")
+        if shared and len(set(codes)) > 1:
+            raise ValueError(f"a shared codebook has one size, got {len(set(codes))}")
         self.scales = tuple(scales)
+        self.divisors = None if divisors is None else tuple(divisors)
         self.draw = draw
         self.level_drop = level_drop
-        self.codebooks = module_list(Codebook(v, width, metric=metric) for v in codes)
+        self.shared = shared
+        self.penalties = penalties
+        books = [Codebook(v, width, metric=metric, enough=enough) for v in (codes[:1] if shared else codes)]
+        self.codebooks: list[Codebook] = (
+            cast("list[Codebook]", SharedCodebook(books[0], len(codes))) if shared else module_list(books)
+        )
         self.phis = module_list(Phi(width, phi) for _ in scales)
+        self.affines = module_list(Affine(width) for _ in (scales if affine else ()))
         self.started: Tensor
         self.register_buffer("started", torch.zeros((), dtype=torch.bool))
         self._known_started = False  # what `started` says, once it says yes: asking a GPU would wait for it
 
     @property
     def length(self) -> int:
-        """Number of latents T: the finest scale."""
+        """Number of latents T at full length: the finest scale."""
         return self.scales[-1]
 
     @property
@@ -187,72 +234,136 @@ class MultiScaleQuantizer(nn.Module):
         """Codebook sizes V_n."""
         return tuple(len(book.counts) for book in self.codebooks)
 
-    def share(self, level: int, ids: Tensor) -> Tensor:
+    def _grid(self, lengths: Tensor | None, length: int | None = None, ids: Sequence[Tensor] = ()) -> Grid:
+        """The grid of a batch. Without lengths all rows are as long as the ids of a level with a token a latent."""
+        if self.divisors is None:
+            return FixedGrid(self.scales)
+        if lengths is None:
+            whole = [i for i, divisor in zip(ids, self.divisors, strict=False) if divisor == 1]
+            if not whole:
+                raise ValueError("the numbers of latents are needed where no level has a token a latent")
+            lengths = torch.full((len(whole[0]),), whole[0].shape[1], device=whole[0].device)
+        return CountedGrid(lengths, int(lengths.max()) if length is None else length, self.divisors)
+
+    def share(self, level: int, ids: Tensor, lengths: Tensor | None = None) -> Tensor:
         """What level number `level` (from 0) adds to the embedding: ids [B, s_n] -> [B, T, D]."""
-        return self.share_of_vectors(level, F.embedding(ids, self.codebooks[level].vectors))
+        return self._share(level, ids, self._level_grid(level, ids, lengths))
 
-    def share_of_vectors(self, level: int, vectors: Tensor) -> Tensor:
+    def share_of_vectors(self, level: int, vectors: Tensor, lengths: Tensor | None = None) -> Tensor:
         """The same for code vectors [B, s_n, D] -> [B, T, D]."""
-        return self.phis[level](resample_up(vectors, self.length))
+        return self._spread(level, vectors, self._level_grid(level, vectors, lengths))
 
-    def encode(self, z: Tensor) -> Quantized:
-        """Latents z [B, T, D] -> Quantized."""
-        residual = z.float()
-        ids, shares, norms = [], [], [residual.square().mean(dim=(1, 2))]
-        for level, size in enumerate(self.scales):
-            ids.append(self.codebooks[level].lookup(resample_down(residual, size)))
-            shares.append(self.share(level, ids[-1]))
+    def _level_grid(self, level: int, tokens: Tensor, lengths: Tensor | None) -> Grid:
+        return self._grid(lengths, ids=[tokens[:, :0]] * level + [tokens])
+
+    def _share(self, level: int, ids: Tensor, grid: Grid) -> Tensor:
+        return self._spread(level, F.embedding(ids, self.codebooks[level].vectors), grid)
+
+    def _spread(self, level: int, vectors: Tensor, grid: Grid) -> Tensor:
+        if self.affines:
+            vectors = self.affines[level].inverse(vectors)
+        return grid.clip(self.phis[level](grid.up(vectors, level)))
+
+    def _sought(self, level: int, residual: Tensor) -> Tensor:
+        """What is looked up for a residual [..., D] of a level."""
+        return self.affines[level](residual).detach() if self.affines else residual
+
+    def encode(self, z: Tensor, lengths: Tensor | None = None) -> Quantized:
+        """Latents z [B, T, D] -> Quantized. lengths: how many of them are real, all by default."""
+        grid = self._grid(lengths, z.shape[1], [z] * len(self.scales))
+        residual = grid.clip(z.float())
+        ids, shares, norms = [], [], [grid.energy(residual)]
+        for level, book in enumerate(self.codebooks):
+            ids.append(_choose(book, self._sought(level, grid.down(level, residual)), grid.real(level)))
+            shares.append(self._share(level, ids[-1], grid))
             residual = residual - shares[-1]
-            norms.append(residual.square().mean(dim=(1, 2)))
+            norms.append(grid.energy(residual))
         per_level = torch.stack(shares)
         return Quantized(Tokens(tuple(ids), self.codes), per_level.sum(dim=0), per_level, torch.stack(norms))
 
-    def accumulate(self, ids: Sequence[Tensor]) -> Iterator[Tensor]:
+    def accumulate(self, ids: Sequence[Tensor], lengths: Tensor | None = None) -> Iterator[Tensor]:
         """Running sums [B, T, D] of the shares, one after each level of ids [B, s_n], coarse to fine."""
+        return self._sums(ids, self._grid(lengths, ids=ids))
+
+    def _sums(self, ids: Sequence[Tensor], grid: Grid) -> Iterator[Tensor]:
         total: Tensor | None = None
         for level, level_ids in enumerate(ids):
-            share = self.share(level, level_ids)
+            share = self._share(level, level_ids, grid)
             total = share if total is None else total + share
             yield total
 
-    def embed(self, tokens: Tokens, levels: int | None = None) -> Tensor:
+    def embed(self, tokens: Tokens, levels: int | None = None, lengths: Tensor | None = None) -> Tensor:
         """Sum of the shares of the coarsest `levels` scales (all by default) -> [B, T, D]; 0 levels give zeros."""
-        total = torch.zeros_like(self.share(0, tokens.ids[0]))
-        for running in self.accumulate(tokens.ids[: len(tokens) if levels is None else levels]):
+        grid = self._grid(lengths, ids=tokens.ids)
+        total = torch.zeros_like(self._share(0, tokens.ids[0], grid))
+        for running in self._sums(tokens.ids[: len(tokens) if levels is None else levels], grid):
             total = running
         return total
 
-    def forward(self, z: Tensor) -> TrainingQuantized:
+    def forward(self, z: Tensor, lengths: Tensor | None = None) -> TrainingQuantized:
         """Latents z [B, T, D] of a training batch -> TrainingQuantized; codebooks move by one EMA step (A6).
 
-        The EMA is fed with the full-length residuals and their own nearest codes, not with the pooled vectors.
+        The EMA is fed with the full-length residuals and their own nearest codes, not with the pooled vectors; that of
+        a shared codebook with the pooled vectors of all levels (E3). lengths as in `encode`.
         """
         with torch.autocast(z.device.type, enabled=False):  # always in float32 (A6, precision)
-            return self._train(z.float())
+            return self._train(z.float(), self._grid(lengths, z.shape[1], [z] * len(self.scales)))
 
-    def _train(self, z: Tensor) -> TrainingQuantized:
-        if self.training and not self._known_started:
+    def _train(self, z: Tensor, grid: Grid) -> TrainingQuantized:
+        z = grid.clip(z)
+        if self.training:
+            self._start(z.detach(), grid)
+        residual, total = z.detach(), torch.zeros_like(z)
+        ids: list[Tensor] = []
+        commitment = z.new_zeros(())
+        fed: list[tuple[Tensor, Tensor]] = []  # what a shared codebook learns from
+        noise = self.draw if self.training else 0.0
+        for level in range(self._levels_used()):
+            book, real = self.codebooks[level], grid.real(level)
+            pooled = self._sought(level, grid.down(level, residual))
+            ids.append(_choose(book, pooled, real, noise))
+            share = self._share(level, ids[-1], grid)
+            if self.training and self.shared:
+                fed.append((_real(pooled, real), _real(ids[-1], real)))
+            elif self.training:
+                flat = _real(self._sought(level, residual), grid.real(None))
+                book.learn(flat, _real(ids[-1], real) if grid.whole(level) else book.lookup(flat, noise))
+            if self.penalties is None:
+                total = total + share
+                commitment = commitment + grid.mse(total.detach(), z) + grid.mse(total, z.detach())
+            else:
+                commitment = commitment + self._penalty(self.penalties, level, z - total, share, grid)
+                total = total + share
+            residual = residual - share.detach()
+        if fed:
+            vectors, chosen = (torch.cat(parts) for parts in zip(*fed, strict=True))
+            self.codebooks[0].learn(vectors, chosen)
+        # with affine levels the value's own gradient reaches W and b
+        straight = total + (z - z.detach()) if self.affines else z + (total - z).detach()
+        return TrainingQuantized(straight, commitment if self.penalties else commitment / len(ids), tuple(ids))
+
+    def _penalty(self, weights: Penalties, level: int, before: Tensor, share: Tensor, grid: Grid) -> Tensor:
+        """C1's terms of one level, divided by OUTER so that a trainer's weight gives them theirs; scalar.
+
+        The commitment is a mean over elements, as in the other systems; the others are squared Frobenius norms.
+        """
+        loss = weights.beta * grid.mse(before, share.detach())
+        if self.affines:
+            loss = loss + weights.gamma * self.affines[level].distance()
+        if weights.decorrelation and level < len(self.scales) - 1:
+            real = grid.real(None)
+            covariance = cross_covariance(_real(share, real), _real(before - share, real))
+            loss = loss + weights.decorrelation * covariance.square().sum()
+        return loss / OUTER
+
+    def _start(self, z: Tensor, grid: Grid) -> None:
+        """Fill the codebooks from the first training batch, once (A6, init)."""
+        if not self._known_started:
             if not bool(self.started):
-                for book in self.codebooks:
-                    book.start(z.detach().flatten(0, 1))
+                for book in dict.fromkeys(self.codebooks):
+                    book.start(_real(z, grid.real(None)))
                 self.started.fill_(True)
             self._known_started = True
-        residual, total = z.detach(), torch.zeros_like(z)
-        ids = []
-        commitment = z.new_zeros(())
-        noise = self.draw if self.training else 0.0
-        for level, size in enumerate(self.scales[: self._levels_used()]):
-            book = self.codebooks[level]
-            ids.append(book.lookup(resample_down(residual, size), noise))
-            share = self.share(level, ids[-1])
-            if self.training:
-                flat = residual.flatten(0, 1)
-                book.learn(flat, ids[-1].flatten() if size == self.length else book.lookup(flat, noise))
-            total = total + share
-            residual = residual - share.detach()
-            commitment = commitment + F.mse_loss(total.detach(), z) + F.mse_loss(total, z.detach())
-        straight = z + (total - z).detach()
-        return TrainingQuantized(straight, commitment / len(ids), tuple(ids))
 
     def _levels_used(self) -> int:
         """How many levels this training step uses: all, or the same random prefix on every process (B1)."""
@@ -261,3 +372,17 @@ class MultiScaleQuantizer(nn.Module):
             return levels
         coin, place = _from_first_process(torch.rand(2, device=self.started.device)).tolist()
         return levels if coin >= self.level_drop else 1 + int(place * levels)
+
+
+def _real(x: Tensor, real: Tensor | None) -> Tensor:
+    """The real ones of x [B, s, ...] one after the other [n, ...]; all without a mask."""
+    return x.flatten(0, 1) if real is None else x[real]
+
+
+def _choose(book: Codebook, vectors: Tensor, real: Tensor | None, noise: float = 0.0) -> Tensor:
+    """Codes [B, s] of vectors [B, s, D]; 0 where none is real."""
+    if real is None:
+        return book.lookup(vectors, noise)
+    ids = torch.zeros(real.shape, dtype=torch.int64, device=vectors.device)
+    ids[real] = book.lookup(vectors[real], noise)
+    return ids
