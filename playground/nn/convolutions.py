@@ -15,7 +15,8 @@ from playground.nn.modules import module_list
 from playground.nn.norm import build_norm
 
 BLOCKS = ("dilated", "normed")
-GROUPS = 4  # of GroupNorm
+GROUPS = 4  # of GroupNorm (A9)
+GROWTH = 3  # dilations of a stage are its powers, the largest first (B1)
 Masks = Sequence[Tensor | None]  # one a stage boundary, fine to coarse
 
 
@@ -36,10 +37,10 @@ class Stack:
     kind: str  # residual blocks: dilated (B1) | normed (A9)
     blocks: int  # residual blocks a stage
     heads: int
-    dropout: float
-    growth: int = 3  # dilations are its powers, the largest first
-    middle: bool = False  # block, attention, block at the coarsest steps (A9)
-    middle_attention: bool = True
+    dropout: float  # in residual blocks
+    attention_dropout: float
+    middle: bool  # block, attention, block at the coarsest steps (A9)
+    middle_attention: bool
 
 
 def clip(x: Tensor, mask: Tensor | None) -> Tensor:
@@ -110,13 +111,13 @@ class Blocks(nn.Module):
         blocks: list[nn.Module] = []
         for n, before in enumerate([inputs, *[outputs] * (count - 1)]):
             if stack.kind == "dilated":
-                blocks.append(DilatedBlock(outputs, stack.growth ** (count - 1 - n), stack.dropout))
+                blocks.append(DilatedBlock(outputs, GROWTH ** (count - 1 - n), stack.dropout))
             elif stack.kind == "normed":
                 blocks.append(NormedBlock(before, outputs, stack.dropout))
             else:
                 raise ValueError(f"unknown residual block {stack.kind!r}; accepted: {', '.join(BLOCKS)}")
         if attention:
-            blocks.append(AttentionBlock(outputs, stack.heads, stack.dropout))
+            blocks.append(AttentionBlock(outputs, stack.heads, stack.attention_dropout))
         self.blocks = module_list(blocks)
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:

@@ -40,7 +40,8 @@ class ConvConfig:
     attention: Attention = "none"  # stages: after each (E3); lowest: after the last and in the middle (A9)
     middle: bool = False  # two more blocks between encoder stages and latents, and back (A9)
     heads: int = 4
-    dropout: float = 0.2
+    dropout: float = 0.2  # in residual blocks
+    attention_dropout: float = 0.1  # E3
     divisors: tuple[int, ...] = (1,) * 6  # latents a token, a level
     fixed_scales: tuple[int, ...] = ()  # in place of divisors: tokens a level, whatever the length (A9)
     codes: tuple[int, ...] = (512,) * 6
@@ -70,11 +71,11 @@ class ConvConfig:
 
 def _lite(config: ConvConfig, **changes: object) -> ConvConfig:
     """A system at a size that one CPU core trains."""
-    return replace(config, **({"width": 192, "code_width": 192, "dropout": 0.0} | changes))  # type: ignore[arg-type]
+    return replace(config, **({"width": 192, "code_width": 192, "dropout": 0.0, "attention_dropout": 0.0} | changes))  # type: ignore[arg-type]
 
 
 _MOMASK = ConvConfig()
-_T2MGPT = replace(_MOMASK, divisors=(1,), codes=(512,), draw=0.0, level_drop=0.0)
+_T2MGPT = replace(_MOMASK, divisors=(1,), codes=(512,), draw=0.0, level_drop=0.0, dropout=0.0)
 _MOMASKPP = replace(
     _MOMASK, divisors=(8, 4, 2, 1), codes=(512,) * 4, shared=True, enough=5, attention="stages", level_drop=0.0
 )
@@ -109,7 +110,9 @@ class ConvTokenizer(nn.Module):
         if c.block == "normed" and not c.fixed_scales:
             raise ValueError("blocks with GroupNorm need fixed scales")
         self.stages = _stages(c)
-        stack = Stack(c.block, c.blocks, c.heads, c.dropout, middle=c.middle, middle_attention=c.attention == "lowest")
+        stack = Stack(
+            c.block, c.blocks, c.heads, c.dropout, c.attention_dropout, c.middle, c.attention == "lowest"
+        )  # fmt: skip
         self.encoder = ConvEncoder(c.columns, c.code_width, self.stages, stack)
         self.decoder = ConvDecoder(c.code_width, c.columns, self.stages, stack)
         self.quantizer = MultiScaleQuantizer(

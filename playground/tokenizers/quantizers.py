@@ -101,21 +101,15 @@ class Codebook(nn.Module):
         if _distributed():
             torch.distributed.all_reduce(counts)
             torch.distributed.all_reduce(sums)
-        if self.enough and float(counts.sum()) <= self.enough * len(counts):
-            self._average(counts, sums)
-            return
         self.counts.lerp_(counts, 1 - self.decay)
         self.sums.lerp_(sums, 1 - self.decay)
-        alive = (self.counts >= 1.0)[:, None]
         average = self.sums / self.counts.clamp(min=1e-5)[:, None]
+        if self.enough and float(counts.sum()) <= self.enough * len(counts):
+            self.vectors.copy_(torch.where((self.counts >= 1e-5)[:, None], average, self.vectors))
+            return
+        alive = (self.counts >= 1.0)[:, None]
         spare = _from_first_process(self.fill(vectors))
         self.vectors.copy_(torch.where(alive, average, spare))
-
-    def _average(self, counts: Tensor, sums: Tensor) -> None:
-        self.counts.lerp_(counts, 1 - self.decay)
-        self.sums.lerp_(sums, 1 - self.decay)
-        known = (self.counts >= 1e-5)[:, None]
-        self.vectors.copy_(torch.where(known, self.sums / self.counts.clamp(min=1e-5)[:, None], self.vectors))
 
 
 class SharedCodebook(nn.ModuleList):

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ SYSTEMS = ("t2mgpt", "momask", "momaskpp", "mosa", "mogo")
 COUNTED = tuple(name for name in SYSTEMS if name != "mosa")
 
 
+@cache
 def tiny(name: str, seed: int = 0, **changes) -> ConvTokenizer:
     """A system's tokenizer with a few thousand weights, codebooks and affine levels filled, in evaluation mode."""
     config = CONV_PRESETS[name]
