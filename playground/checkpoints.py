@@ -1,13 +1,14 @@
 """Self-describing checkpoints: one safetensors file holds half-precision weights, and its metadata says the rest.
 
-Metadata: format, kind (tokenizer | generator | evaluator), config, encoder (name, width, hash of the text encoder),
-data, facts (steps, seconds, seed, validation figures). Loading needs no other file and runs no pickle.
+Metadata: format, kind (tokenizer | generator | evaluator), architecture (a row of architectures.py; absent in old files
+and of evaluators), config, encoder (name, width, hash of the text encoder), data, facts (steps, seconds, seed,
+validation figures). Loading needs no other file and runs no pickle.
 """
 
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,16 +18,14 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
+from playground.architectures import FIRST, architecture, build, name_of
 from playground.errors import PlaygroundError
-from playground.generators.scalewise import GeneratorConfig, ScalewiseTransformer, build_generator
 from playground.motion.representation import Normaliser
 from playground.nn.linear import pack
 from playground.text.features import EncoderId
-from playground.tokenizers.transformer import LGTok, TokenizerConfig, build_tokenizer
 
 Model = TypeVar("Model", bound=nn.Module)
 FORMAT = "1"
-CONFIGS: Mapping[str, type] = {"tokenizer": TokenizerConfig, "generator": GeneratorConfig}  # kind -> its config
 TRAINING_ONLY = ("sums", "counts", "started")  # state of the EMA codebooks, not shipped
 
 
@@ -35,11 +34,11 @@ class Card:
     """What a checkpoint says of itself."""
 
     kind: str  # tokenizer | generator | evaluator
-    config: Any  # TokenizerConfig | GeneratorConfig | EvaluatorConfig
+    config: Any  # of the architecture, or an EvaluatorConfig
     encoder: EncoderId
     data: str  # name of the library it saw
     facts: dict[str, Any]  # step, seconds, seed, last validation figures
-    normaliser: Normaliser | None = None  # of the features that a tokenizer or an evaluator reads
+    normaliser: Normaliser | None = None  # of the features that are read or, without a tokenizer, made
     hash: str = ""  # sha256 of the file, filled by loading
 
 
@@ -63,6 +62,8 @@ def save_checkpoint(path: Path, model: nn.Module, card: Card, dtype: torch.dtype
         "data": card.data,
         "facts": json.dumps(facts),
     }
+    if card.kind in FIRST:
+        metadata["architecture"] = name_of(card.config)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
     save_file(tensors, partial, metadata)
@@ -74,26 +75,32 @@ def read_card(path: Path) -> Card:
     return _read(path)[0]
 
 
-def load_tokenizer(path: Path) -> tuple[LGTok, Card]:
+def load_tokenizer(path: Path) -> tuple[Any, Card]:
     """A tokenizer in evaluation mode, float32, with its card. PlaygroundError if the file is not one."""
-    card, tensors = _read(path, kind="tokenizer", weights=True)
-    return _fill(build_tokenizer(card.config), tensors, path), card
+    return _load(path, "tokenizer")
 
 
-def load_generator(path: Path) -> tuple[ScalewiseTransformer, Card]:
-    """A generator in evaluation mode, float32, with its card. PlaygroundError if the file is not one."""
-    card, tensors = _read(path, kind="generator", weights=True)
-    return _fill(build_generator(card.config), tensors, path), card
+def load_generator(path: Path) -> tuple[Any, Card]:
+    """The network of a generator in evaluation mode, float32, with its card. PlaygroundError if the file is not one."""
+    return _load(path, "generator")
+
+
+def _load(path: Path, kind: str) -> tuple[Any, Card]:
+    card, tensors = _read(path, kind, weights=True)
+    return _fill(_built(path, build, card), tensors, path), card
 
 
 def load_model(path: Path, kind: str, config: type, build: Callable[[Any], Model]) -> tuple[Model, Card]:
     """A model of a kind from a floor above: the class of its config, and what builds it. Errors as above."""
-    card, tensors = _read(path, kind, weights=True, configs={kind: config})
+    card, tensors = _read(path, kind, weights=True, config=config)
+    return _fill(_built(path, build, card), tensors, path), card
+
+
+def _built(path: Path, build: Callable[[Any], Model], card: Card) -> Model:
     try:
-        model = build(card.config)
+        return build(card.config)
     except (TypeError, ValueError, RuntimeError) as error:
         raise PlaygroundError(f"{path} asks for a model that this version cannot build") from error
-    return _fill(model, tensors, path), card
 
 
 def _fill(model: Model, tensors: dict[str, Tensor], path: Path) -> Model:
@@ -110,7 +117,7 @@ def _fill(model: Model, tensors: dict[str, Tensor], path: Path) -> Model:
 
 
 def _read(
-    path: Path, kind: str | None = None, weights: bool = False, configs: Mapping[str, type] = CONFIGS
+    path: Path, kind: str | None = None, weights: bool = False, config: type | None = None
 ) -> tuple[Card, dict[str, Tensor]]:
     try:
         with safe_open(str(path), framework="pt") as file:
@@ -122,7 +129,7 @@ def _read(
         if kind is not None and metadata["kind"] != kind:
             raise PlaygroundError(f"{path} is no {kind} checkpoint but one of kind {metadata['kind']}")
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        card = _card(metadata, tensors, digest, configs[metadata["kind"]])
+        card = _card(metadata, tensors, digest, config or _config_of(metadata))
     except (OSError, SafetensorError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, PlaygroundError):
             raise
@@ -130,6 +137,12 @@ def _read(
             f"{path} is not a checkpoint of the playground (a .safetensors file with a card)"
         ) from error
     return card, tensors
+
+
+def _config_of(metadata: dict[str, str]) -> type:
+    """The config class of a tokenizer's or a generator's file. KeyError for another kind."""
+    kind = metadata["kind"]
+    return architecture(metadata.get("architecture", FIRST[kind]), kind).config
 
 
 def _card(metadata: dict[str, str], tensors: dict[str, Tensor], digest: str, config_type: type) -> Card:

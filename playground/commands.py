@@ -82,8 +82,9 @@ def decode(tokens: Path, caption: str | None, guidance: float, out: Path) -> Non
     _check_system(engine, file.system)
     if caption is not None:
         caption = normalise(caption, what="caption", allow_empty=True)
-    given, expected = [(level.size, level.codes) for level in file.levels], engine.scales(file.system)
-    if given != expected:
+    codes = [count for _, count in engine.scales(file.system)]
+    expected = list(zip(engine.sizes(file.system, file.frames), codes, strict=True))
+    if [(level.size, level.codes) for level in file.levels] != expected:
         raise PlaygroundError(
             f"{tokens} does not fit {file.system}, which has {len(expected)} levels of "
             f"{', '.join(str(size) for size, _ in expected)} tokens"

@@ -16,6 +16,7 @@ from playground.generators.base import Edit, redraw_masks
 from playground.nn.sampling import Sampling, filter_logits
 from playground.runtime import Runtime
 from playground.systems import SamplingDefaults
+from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
 from playground.tokenizers.quantizers import resample_down
 from playground.tokenizers.token_file import LevelTokens
@@ -29,11 +30,19 @@ Check = Callable[[], None] | None
 
 
 @torch.no_grad()
-def shares(runtime: Runtime, levels: Sequence[LevelTokens]) -> list[Tensor]:
-    """What each level adds to the embedding, [1, T, D] a level. PlaygroundError if the tokens do not fit."""
-    runtime.embedding(levels, 0)
-    quantizer = runtime.tokenizer.quantizer
-    return [quantizer.share(n, torch.from_numpy(level.ids.copy())[None]) for n, level in enumerate(levels)]
+def shares(runtime: Runtime, levels: Sequence[LevelTokens], frames: int) -> list[Tensor]:
+    """What each level adds to the embedding of a motion of so many frames, [1, T, D] a level.
+
+    PlaygroundError if the tokens do not fit.
+    """
+    runtime.embedding(levels, frames, 0)
+    return [share(runtime, n, level.ids[None], frames) for n, level in enumerate(levels)]
+
+
+def share(runtime: Runtime, level: int, ids: Ids, frames: int) -> Tensor:
+    """What level `level` (from 0) adds to embeddings of motions of one length: ids [B, s] -> [B, T, D]."""
+    lengths = torch.full((len(ids),), runtime.latents(frames))
+    return runtime.tokenizer.quantizer.share(level, torch.from_numpy(np.array(ids, np.int64)), lengths)
 
 
 def total(parts: Sequence[Tensor]) -> Tensor:
@@ -44,17 +53,17 @@ def total(parts: Sequence[Tensor]) -> Tensor:
     return out
 
 
-def subset(runtime: Runtime, levels: Sequence[LevelTokens], chosen: Sequence[int]) -> Tensor:
+def subset(runtime: Runtime, levels: Sequence[LevelTokens], frames: int, chosen: Sequence[int]) -> Tensor:
     """Embedding [1, T, D] of some levels (from 0) alone; zeros if there are none."""
-    parts = shares(runtime, levels)
+    parts = shares(runtime, levels, frames)
     return total([parts[n] for n in chosen]) if chosen else torch.zeros_like(parts[0])
 
 
 @torch.no_grad()
-def replaced(runtime: Runtime, levels: Sequence[LevelTokens], level: int, ids: Ids) -> Tensor:
+def replaced(runtime: Runtime, levels: Sequence[LevelTokens], frames: int, level: int, ids: Ids) -> Tensor:
     """Embeddings [B, T, D] of one motion whose level `level` (from 0) holds other ids [B, s] in each row."""
-    parts = shares(runtime, levels)
-    parts[level] = runtime.tokenizer.quantizer.share(level, torch.from_numpy(np.array(ids, np.int64)))
+    parts = shares(runtime, levels, frames)
+    parts[level] = share(runtime, level, ids, frames)
     return total(parts)
 
 
@@ -78,7 +87,8 @@ def decode_edited(
     """Un-normalised rows [F, 67]; text acts only on the frames where `edited` (bool [F]) is True (Eq. 7)."""
     mask = torch.from_numpy(edited)[None]
     text = runtime.text(caption)
-    decoded = runtime.tokenizer.decode(runtime.embedding(levels), torch.tensor([frames]), text, guidance, mask)
+    embedding = runtime.embedding(levels, frames)
+    decoded = runtime.tokenizer.decode(embedding, torch.tensor([frames]), text, guidance, mask)
     return runtime.normaliser.invert(decoded[0].numpy())
 
 
@@ -88,25 +98,21 @@ def energies(runtime: Runtime, features: Floats, caption: str, levels: Sequence[
     x = torch.from_numpy(runtime.normaliser.apply(features))[None]
     rest = runtime.tokenizer.latents(x, torch.tensor([len(features)]), runtime.text(caption)).float()
     left = [rest.square().mean()]
-    for share in shares(runtime, levels):
-        rest = rest - share
+    for part in shares(runtime, levels, len(features)):
+        rest = rest - part
         left.append(rest.square().mean())
     norm = torch.stack(left)
     return (norm / norm[0].clamp(min=1e-12)).numpy()
 
 
 @torch.no_grad()
-def token_vectors(runtime: Runtime, ids: Sequence[Ids]) -> list[Floats]:
+def token_vectors(runtime: Runtime, ids: Sequence[Ids], frames: int) -> list[Floats]:
     """What each token adds to the embedding where it stands: ids [B, s_n] a level -> [B, s_n, D] a level.
 
-    The share of its level, pooled back from the latents to the level's own length.
+    The share of its level, pooled back from the latents to the level's own length. All motions have so many frames.
     """
-    quantizer = runtime.tokenizer.quantizer
-    vectors = []
-    for level, level_ids in enumerate(ids):
-        share = quantizer.share(level, torch.from_numpy(np.array(level_ids, np.int64)))
-        vectors.append(resample_down(share, level_ids.shape[1]).numpy())
-    return vectors
+    found = [share(runtime, level, level_ids, frames) for level, level_ids in enumerate(ids)]
+    return [resample_down(one, level_ids.shape[1]).numpy() for one, level_ids in zip(found, ids, strict=True)]
 
 
 def text_attention(
@@ -118,7 +124,7 @@ def text_attention(
     if text is None or reads is None:
         raise PlaygroundError("there is no attention to words without a caption, or in a system that reads none")
     try:
-        weights = reads(runtime.embedding(levels), torch.tensor([frames]), text)[:, 0]
+        weights = reads(runtime.embedding(levels, frames), torch.tensor([frames]), text)[:, 0]
     except ValueError:
         raise PlaygroundError(f"the detokenizer of {runtime.name} has no cross-attention to text to look at") from None
     words = text.words[0]
@@ -131,13 +137,18 @@ def text_attention(
 
 @dataclass(frozen=True, eq=False)
 class DrawnBatch:
-    """One step of a generation with several seeds."""
+    """One step of a generation with several seeds. entropy, logits: of the levels that this step has finished."""
 
     level: int  # levels drawn, from 1
     levels: list[tuple[LevelTokens, ...]]  # one entry a seed
-    entropy: Floats  # [B, s_level] bits
+    entropy: tuple[Floats, ...]  # [B, s_n] bits a level
     embedding: Tensor  # [B, T, D]
-    logits: Tensor  # [B, s_level, V], guided
+    logits: tuple[Tensor, ...]  # [B, s_n, V] a level, guided
+
+    def logits_of(self, level: int) -> Tensor | None:
+        """Those of level number `level` (from 1); None if another step has finished it."""
+        place = level - 1 - (self.level - len(self.logits))
+        return self.logits[place] if 0 <= place < len(self.logits) else None
 
 
 def keep(levels: Sequence[LevelTokens], redraw: Sequence[Bools]) -> Edit:
@@ -162,21 +173,36 @@ def draw_scales(
 ) -> Iterator[DrawnBatch]:
     """Draw one motion a seed, all at once, scale by scale; each row draws as it would alone.
 
-    PlaygroundError if the system has no generator.
+    PlaygroundError if the system has no generator of tokens.
     """
-    if runtime.generator is None:
-        raise PlaygroundError(f"the system {runtime.name} has no generator; it can tokenize and decode only")
-    options = {key: value for key, value in asdict(how).items() if key != "guidance"}
-    sampling = Sampling(**options, check=check, seeds=tuple(seeds))
-    text = runtime.texts([prompt] * len(seeds), prompts=True) if prompt else None
-    lengths = torch.full((len(seeds),), frames)
-    for step in runtime.generator.steps(text, lengths, sampling, edit):
+    generator, done = runtime.drawing, 0
+    for step in generator.steps(*_asked(runtime, prompt, frames, seeds, how, check), edit):
         ids, codes = [level.numpy().astype(np.int64) for level in step.tokens.ids], step.tokens.codes
         levels = [
             tuple(LevelTokens(o.shape[1], c, o[row]) for o, c in zip(ids, codes, strict=False))
             for row in range(len(seeds))
         ]
-        yield DrawnBatch(step.level, levels, step.entropy.numpy(), step.embedding, step.logits)
+        sizes, done = [o.shape[1] for o in ids[done:]], step.level  # a step may finish several levels
+        entropy = tuple(part.numpy() for part in step.entropy.split(sizes, dim=1))
+        yield DrawnBatch(step.level, levels, entropy, step.embedding, step.logits.split(sizes, dim=1))
+
+
+def draw_features(
+    runtime: Runtime, prompt: str | None, frames: int, seeds: Sequence[int], how: SamplingDefaults, check: Check = None
+) -> Iterator[tuple[int, int, Floats]]:
+    """Motions of a system without tokens, one a seed: steps done, steps in all, normalised rows [B, F, C] so far."""
+    assert runtime.diffusion is not None
+    for done, count, guess in runtime.diffusion.steps_of(*_asked(runtime, prompt, frames, seeds, how, check)):
+        yield done, count, guess.numpy()
+
+
+def _asked(
+    runtime: Runtime, prompt: str | None, frames: int, seeds: Sequence[int], how: SamplingDefaults, check: Check
+) -> tuple[TextFeatures | None, Tensor, Sampling]:
+    """Text, lengths and sampling of a draw of one motion a seed."""
+    options = {key: value for key, value in asdict(how).items() if key != "guidance"}
+    text = runtime.texts([prompt] * len(seeds), prompts=True) if prompt else None
+    return text, torch.full((len(seeds),), frames), Sampling(**options, check=check, seeds=tuple(seeds))
 
 
 def chances(logits: Tensor, how: SamplingDefaults) -> tuple[Floats, Floats]:

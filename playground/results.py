@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from playground.errors import PlaygroundError
 from playground.motion.motion import Motion
 from playground.motion.representation import COLUMNS
-from playground.systems import SamplingDefaults
+from playground.systems import SamplingDefaults, row_of
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 
 Floats = NDArray[np.float32]
@@ -53,13 +54,19 @@ class Decoded:
 
 @dataclass(frozen=True, eq=False)
 class GenerationStep:
-    """A motion on its way: what is known after some scales."""
+    """A motion on its way: what is known after some scales, or without tokens after some steps of denoising."""
 
-    level: int  # scales drawn, from 1
-    levels: tuple[LevelTokens, ...]
+    level: int  # scales drawn, or steps done, from 1
+    levels: tuple[LevelTokens, ...]  # empty for a system without tokens
     entropy: tuple[Floats, ...]  # [s_n] bits a scale, of the distributions drawn from
     motion: Motion  # decoded from the scales so far
     features: Floats = field(repr=False)  # [F, 67] of that motion, normalised
+    of: int = 0  # scales, or steps, in all; 0 where nobody counts them
+
+    @property
+    def last(self) -> bool:
+        """Whether nothing comes after it."""
+        return self.level >= self.of
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +77,7 @@ class Generation:
     checkpoint: str
     prompt: str  # "" for free-form
     seed: int
-    levels: tuple[LevelTokens, ...]
+    levels: tuple[LevelTokens, ...]  # empty for a system without tokens
     entropy: tuple[Floats, ...]
     motion: Motion
     features: Floats = field(repr=False)  # [F, 67], normalised
@@ -83,7 +90,9 @@ class Generation:
         return self.prompt
 
     def token_file(self) -> TokenFile:
-        """The tokens as a file that can be saved and decoded."""
+        """The tokens as a file that can be saved and decoded. PlaygroundError if the system makes none."""
+        if not self.levels:
+            raise PlaygroundError(row_of(self.system).no_tokenizer)
         return TokenFile(self.system, self.checkpoint, self.prompt, self.motion.frames, self.levels)
 
 

@@ -6,6 +6,7 @@ Two files a system, in `assets/analysis/` where it is shipped:
                      "agreement", "chance", "sizes": [N], "codes": [N], "versions": {...}, "note",
                      "clips": [{"id", "index", "source", "action", "caption", "frames"}, ...]}
     <system>.npz    means float32 [n, D], tsne float32 [n, 2], pca float32 [n, 2], tokens int16 [n, sum of sizes],
+                    each level filled up with -1 where a motion has fewer tokens than one of full length,
                     counts int32 [sum of codes], energy float32 [n, N + 1], errors_mm float32 [n],
                     pca_centre float32 [D], pca_axes float32 [2, D]: pca = (means - centre) @ axes.T
                     token_index int32 [m, 3]: row, scale from 1 and position of each token of the map of tokens
@@ -63,7 +64,7 @@ class StoredAnalysis:
     explained: tuple[float, float]  # share of the variance along the PCA axes
     agreement: float  # share of the 10 nearest neighbours of the same action, in all D dimensions
     chance: float  # the same for shuffled actions
-    sizes: tuple[int, ...]  # tokens a scale
+    sizes: tuple[int, ...]  # tokens a scale at full length
     codes: tuple[int, ...]  # codebook size a scale
     versions: dict[str, str]  # of the packages that computed it
     note: str
@@ -71,7 +72,7 @@ class StoredAnalysis:
     means: Floats  # [n, D]
     tsne: Floats  # [n, 2]
     pca: Floats  # [n, 2]
-    tokens: NDArray[np.int16]  # [n, sum of sizes]
+    tokens: NDArray[np.int16]  # [n, sum of sizes], -1 where a motion has fewer
     counts: NDArray[np.int32]  # [sum of codes]
     energy: Floats  # [n, N + 1]
     errors_mm: Floats  # [n] mean error of each clip, caption of the data set at both ends, g = 0
@@ -134,7 +135,13 @@ class StoredAnalysis:
     def levels(self, row: int) -> tuple[LevelTokens, ...]:
         """Tokens of one clip, one entry a scale."""
         parts = np.split(self.tokens[row].astype(np.int64), np.cumsum(self.sizes)[:-1])
-        return tuple(LevelTokens(len(ids), codes, ids) for ids, codes in zip(parts, self.codes, strict=True))
+        real = [ids[ids >= 0] for ids in parts]
+        return tuple(LevelTokens(len(ids), codes, ids) for ids, codes in zip(real, self.codes, strict=True))
+
+    def count(self, row: int, scale: int) -> int:
+        """Tokens of one clip on a scale (0-based)."""
+        start = sum(self.sizes[:scale])
+        return int((self.tokens[row, start : start + self.sizes[scale]] >= 0).sum())
 
     def token_file(self, row: int) -> TokenFile:
         """One clip as a token file, for `engine.decode`; its caption is ours."""

@@ -41,6 +41,28 @@ class SystemRow:
     command: str = "train"  # the command that makes its files
     latents_are_frames: bool = False  # does a latent stand for a fixed span of frames by construction?
     sampling: SamplingDefaults = SamplingDefaults()
+    lends: str = ""  # the system whose tokenizer file is used
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts that it consists of: tokenizer, generator or both. The file of the first one identifies it."""
+        there = {"tokenizer": self.tokenizer, "generator": self.generator}
+        return tuple(part for part, kind in there.items() if kind is not None)
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """The parts without which there is nothing to show; a tokenizer of its own can stand alone."""
+        return self.parts if self.lends else self.parts[:1]
+
+    @property
+    def no_tokenizer(self) -> str:
+        """The sentence for a person who asks for tokens of a system that has none."""
+        return f"the system {self.name} has no tokenizer: it makes motions from text, without tokens"
+
+    @property
+    def no_generator(self) -> str:
+        """The sentence for a person who asks a system that has no generator to make a motion."""
+        return f"the system {self.name} has no generator; it can tokenize and decode only"
 
     @property
     def absent(self) -> str:
@@ -114,8 +136,10 @@ class SystemInfo:
 
 
 def checkpoint_path(assets: Path, name: str, part: str) -> Path:
-    """The file of a system's `tokenizer` or `generator`."""
-    return assets / "checkpoints" / name / f"{part}.safetensors"
+    """The file of a system's `tokenizer` or `generator`; another system's where that one lends its tokenizer."""
+    row = SYSTEMS.get(name)
+    owner = row.lends if row is not None and row.lends and part == "tokenizer" else name
+    return assets / "checkpoints" / owner / f"{part}.safetensors"
 
 
 def row_of(name: str) -> SystemRow:
@@ -146,20 +170,24 @@ def header(path: Path) -> dict[str, Any] | None:
 
 
 def describe(assets: Path, row: SystemRow) -> SystemInfo:
-    """What a system's checkpoint files say, without loading a weight."""
-    heads = {part: header(checkpoint_path(assets, row.name, part)) for part in ("tokenizer", "generator")}
+    """What a system's checkpoint files say, without loading a weight.
+
+    It is absent unless every file that it needs is there.
+    """
+    heads = {part: header(checkpoint_path(assets, row.name, part)) for part in row.parts}
+    if any(heads[part] is None for part in row.needed):
+        heads = dict.fromkeys(row.parts)
     numbers = 0
     for head in heads.values():
         shapes = [v["shape"] for k, v in (head or {}).items() if k.startswith("model.")]
         numbers += sum(prod(shape) for shape in shapes)
     metadata = next((head["__metadata__"] for head in heads.values() if head is not None), None)
-    has_generator = row.generator is not None and heads["generator"] is not None
     return SystemInfo(
         name=row.name,
         title=row.title,
         family=row.family,
         tokenizer=row.tokenizer,
-        generator=row.generator if has_generator or metadata is None else None,
+        generator=row.generator if metadata is None or heads.get("generator") is not None else None,
         text=f"{row.text}, {row.prompts}" if row.prompts else row.text,
         parameters=numbers,
         data=metadata["data"] if metadata else "",

@@ -20,7 +20,7 @@ FLOORS = (
     {"text", "data"},
     {"tokenizers"},
     {"generators"},
-    {"checkpoints", "systems", "results", "findings", "stored", "runtime", "probes", "engine", "launch"},
+    {"architectures", "checkpoints", "systems", "results", "findings", "stored", "runtime", "probes", "engine", "launch"},
     {"training", "evaluation", "analysis", "convert", "bench"},
     {"figures"},
     {"ui", "cli", "commands", "__main__"},

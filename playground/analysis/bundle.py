@@ -50,5 +50,14 @@ def stored_systems(folder: Path) -> list[str]:
 
 
 def counts_of(ids: Sequence[NDArray[np.int64]], codes: Sequence[int]) -> NDArray[np.int32]:
-    """Counts of every code of every scale, back to back [sum of codes]; ids: [n, s_n] a scale."""
-    return np.concatenate(CodeUsage().fit(ids, codes).counts_).astype(np.int32)
+    """Counts of every code of every scale, back to back [sum of codes]; ids: [n, s_n] a scale, -1 for no token."""
+    return np.concatenate(CodeUsage().fit([level[level >= 0] for level in ids], codes).counts_).astype(np.int32)
+
+
+def padded_ids(clips: Sequence[Sequence[NDArray[np.int64]]], sizes: Sequence[int]) -> list[NDArray[np.int64]]:
+    """Tokens of n clips, one array a scale each, as one array [n, s_n] a scale, filled up with -1."""
+    levels = [np.full((len(clips), size), -1, np.int64) for size in sizes]
+    for row, clip in enumerate(clips):
+        for level, ids in zip(levels, clip, strict=True):
+            level[row, : len(ids)] = ids
+    return levels

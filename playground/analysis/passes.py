@@ -29,7 +29,7 @@ class ClipPass:
     index: int  # clip of the library
     rows: int  # feature rows measured
     ids: tuple[NDArray[np.int64], ...]  # [s_n] a level
-    mean_embedding: Floats  # [D], z_hat averaged over the latents
+    mean_embedding: Floats  # [D], z_hat averaged over the motion's own latents
     energy: Floats  # [N+1], share of the latent's energy left after 0..N scales
     errors_mm: Floats  # [rows], pelvis-relative error of each frame (F2)
 
@@ -79,24 +79,24 @@ def _groups(work: list[tuple[int, int, str]], batch: int) -> Iterator[list[tuple
 def _one_batch(runtime: "Runtime", library: Library, group: list[tuple[int, int, str]]) -> Iterator[ClipPass]:
     import torch
 
-    rule = runtime.tokenizer.config.heading
+    tokenizer, rule = runtime.tokenizer, runtime.heading
     features = [library.features(index, rule)[:rows] for rows, index, _ in group]
     lengths = torch.tensor([rows for rows, _, _ in group])
     padded = torch.zeros(len(group), int(lengths.max()), features[0].shape[1])
     for line, values in enumerate(features):
         padded[line, : len(values)] = torch.from_numpy(runtime.normaliser.apply(values))
     text = runtime.encoder.encode([caption for _, _, caption in group]) if group[0][2] else None
-    quantized = runtime.tokenizer.encode(padded, lengths, text)
-    decoded = runtime.tokenizer.decode(quantized.embedding, lengths, text).numpy()
+    quantized = tokenizer.encode(padded, lengths, text)
+    decoded = tokenizer.decode(quantized.embedding, lengths, text).numpy()
     norm = quantized.residual_norm.double().numpy()  # (N + 1, B)
     energy = norm / np.maximum(norm[0], 1e-12)
     for line, (rows, index, _) in enumerate(group):
-        rebuilt = from_features67(runtime.normaliser.invert(decoded[line, :rows]))
+        rebuilt, sizes = from_features67(runtime.normaliser.invert(decoded[line, :rows])), tokenizer.sizes(rows)
         yield ClipPass(
             index=index,
             rows=rows,
-            ids=tuple(level[line].numpy().astype(np.int64) for level in quantized.tokens.ids),
-            mean_embedding=quantized.embedding[line].double().mean(dim=0).numpy(),
+            ids=tuple(i[line, :size].numpy() for i, size in zip(quantized.tokens.ids, sizes, strict=True)),
+            mean_embedding=quantized.embedding[line, : sizes[-1]].double().mean(dim=0).numpy(),
             energy=energy[:, line],
             errors_mm=joint_errors(from_features67(features[line]), rebuilt),
         )

@@ -26,7 +26,6 @@ RESULTS = ASSETS / "results"
 NOT_TRAINED = "not trained yet"
 NOT_MEASURED = "trained, not measured yet"
 NO_GENERATOR = "has no generator"
-PARTS = {"checkpoint": "tokenizer", "generator": "generator"}  # of a provenance -> of a system
 _KEYS = ("item", "made_by", "provenance", "rows")
 
 
@@ -152,8 +151,13 @@ def write_result(result: Result, folder: Path = RESULTS) -> Path:
 
 
 def files_of(system: str, assets: Path = ASSETS) -> dict[str, str]:
-    """{"checkpoint", "generator"}: digests of a system's files, "" where there is none; what a provenance states."""
-    paths = {key: checkpoint_path(assets, system, part) for key, part in PARTS.items()}
+    """{"checkpoint", "generator"}: digests of a system's files, "" where there is none; what a provenance states.
+
+    "checkpoint" is that of the file which identifies the system: without a tokenizer it is the generator's.
+    """
+    first = row_of(system).parts[0]
+    paths = {"checkpoint": checkpoint_path(assets, system, first)}
+    paths["generator"] = checkpoint_path(assets, system, "generator")
     return {
         key: hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else "" for key, path in paths.items()
     }
@@ -170,8 +174,9 @@ def why_absent(system: str, draws: bool = True, assets: Path = ASSETS) -> str:
     row = row_of(system)
     if draws and row.generator is None:
         return NO_GENERATOR
-    files = files_of(system, assets)
-    return NOT_MEASURED if files["checkpoint"] and (files["generator"] or not draws) else NOT_TRAINED
+    paths = {part: checkpoint_path(assets, system, part) for part in row.parts}
+    needed = row.parts if draws else row.needed
+    return NOT_MEASURED if all(paths[part].is_file() for part in needed) else NOT_TRAINED
 
 
 # ---- a claim of a paper against our numbers --------------------------------------------------------------------------

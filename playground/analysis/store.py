@@ -17,6 +17,7 @@ from playground.analysis.bundle import (
     Bundle,
     BundleClip,
     counts_of,
+    padded_ids,
     read_bundle,
     stored_systems,
     write_bundle,
@@ -29,6 +30,7 @@ from playground.analysis.tokenmap import map_tokens
 from playground.data.library import Library
 from playground.engine import ASSETS, Engine, default_engine
 from playground.errors import PlaygroundError
+from playground.systems import row_of
 
 NOTE = (
     f"Each clip is kept as {DECODED_NOTE}; neither the recorded motion nor a caption of the data set is stored. "
@@ -59,7 +61,7 @@ def build_bundle(
         raise PlaygroundError(f"the split {split} of {library_path} holds no clip long enough to be analysed")
     passes.sort(key=lambda one: one.index)
     clips = tuple(_clip(library, one) for one in passes)
-    ids = [np.stack(level) for level in zip(*(one.ids for one in passes), strict=True)]
+    ids = padded_ids([one.ids for one in passes], runtime.tokenizer.config.scales)
     means = np.stack([one.mean_embedding for one in passes]).astype(np.float32)
     tsne, pca = EmbeddingMap().fit(means, "tsne", seed), EmbeddingMap().fit(means, "pca", seed)
     agreement, chance = neighbour_agreement(means, [clip.action for clip in clips])
@@ -88,7 +90,7 @@ def build_bundle(
         counts=counts_of(ids, codes),
         energy=np.stack([one.energy for one in passes]).astype(np.float32),
         errors_mm=np.array([one.errors_mm.mean() for one in passes], np.float32),
-        **vars(map_tokens(runtime, ids, seed)),
+        **vars(map_tokens(runtime, ids, [one.rows for one in passes], seed)),
     )
 
 
@@ -122,8 +124,11 @@ def analyses_of(
     recompute: computed now for every system that has a tokenizer, on at most `limit` clips of the split.
     PlaygroundError if there is none at all.
     """
-    there = {name: bool(files_of(name)["checkpoint"]) if recompute else name in stored_systems(folder)
-             for name in systems}  # fmt: skip
+
+    def can(name: str) -> bool:
+        return row_of(name).tokenizer is not None and bool(files_of(name)["checkpoint"])
+
+    there = {name: can(name) if recompute else name in stored_systems(folder) for name in systems}
     found = {
         name: analysis_of(
             name, library=library if recompute else None, split=split, limit=limit, seed=seed, folder=folder

@@ -48,17 +48,28 @@ class BaseEngine:
         return [describe(self.assets, row) for row in SYSTEMS.values()]
 
     def scales(self, system: str) -> list[tuple[int, int]]:
-        """(tokens, codes) of every scale, coarse to fine; loads no weight."""
+        """(tokens, codes) of every scale at full length, coarse to fine, [] without a tokenizer; loads no weight."""
+        if row_of(system).tokenizer is None:
+            return []
         config = self._config(system)
         return list(zip(config["scales"], config["codes"], strict=True))
+
+    def sizes(self, system: str, frames: int) -> tuple[int, ...]:
+        """Tokens of every scale of a motion of so many frames, coarse to fine; () without a tokenizer."""
+        if row_of(system).tokenizer is None:
+            return ()
+        if not 1 <= frames <= LIMITS.max_frames:
+            raise PlaygroundError(f"a motion has 1 to {LIMITS.max_frames} frames, got {frames}")
+        return tuple(self.runtime(system).tokenizer.sizes(frames))
 
     def heading(self, system: str) -> str:
         """The rule by which the features of a system read the heading off the body; loads no weight."""
         return str(self._config(system).get("heading", "body"))
 
     def codebooks(self, system: str) -> list[NDArray[np.float32]]:
-        """Code vectors [V, D] of every scale."""
-        return self.runtime(system).codebooks()
+        """Code vectors [V, D] of every scale; [] without a tokenizer."""
+        runtime = self.runtime(system)
+        return [] if runtime.codec is None else runtime.codebooks()
 
     def examples(self) -> list[Example]:
         """The example library; empty where none is shipped."""
@@ -127,7 +138,7 @@ class BaseEngine:
         else:
             from playground.probes import subset
 
-            embedding = subset(runtime, tokens.levels, chosen.levels(count))
+            embedding = subset(runtime, tokens.levels, tokens.frames, chosen.levels(count))
             features = runtime.decode_embedding(embedding, tokens.frames, text, guidance)
         motion = Motion(from_features67(runtime.normaliser.invert(features)), caption=text)
         used = len(chosen.levels(count))
@@ -136,6 +147,8 @@ class BaseEngine:
     def guidance_pair(self, result: Tokenized | Generation, caption: str | None = None) -> GuidancePair:
         """Both branches of the detokenizer's guidance for a tokenized or generated motion."""
         runtime = self.runtime(result.system)
+        if runtime.codec is None:
+            raise PlaygroundError(row_of(result.system).no_tokenizer)
         text = normalise(result.caption if caption is None else caption, what="caption", allow_empty=True)
         conditional, unconditional = runtime.branches(result.levels, result.motion.frames, text)
         return GuidancePair(conditional, unconditional, runtime.normaliser.mean, runtime.normaliser.std)
@@ -209,11 +222,13 @@ class BaseEngine:
     # ---- inside ---------------------------------------------------------------------------------------------------
 
     def _config(self, system: str) -> dict[str, Any]:
-        """The config that a system's tokenizer file states."""
+        """The config that a system's tokenizer file states. PlaygroundError if there is none."""
         row = row_of(system)
-        head = header(checkpoint_path(self.assets, row.name, "tokenizer"))
+        head = header(checkpoint_path(self.assets, row.name, row.parts[0]))
         if head is None:
             raise PlaygroundError(row.absent)
+        if row.tokenizer is None:
+            raise PlaygroundError(row.no_tokenizer)
         config: dict[str, Any] = json.loads(head["__metadata__"]["config"])
         return config
 

@@ -55,12 +55,12 @@ def prototype(runtime: "Runtime", scale: int, code: int, frames: int) -> Decoded
     from playground.probes import subset
 
     began = time.perf_counter()
-    config = runtime.tokenizer.config
-    pairs = enumerate(zip(config.scales, config.codes, strict=True), start=1)
+    tokenizer = runtime.tokenizer
+    pairs = enumerate(zip(tokenizer.sizes(frames), tokenizer.quantizer.codes, strict=True), start=1)
     levels = [
         LevelTokens(size, codes, np.full(size, code if n == scale else 0, np.int64)) for n, (size, codes) in pairs
     ]
-    features = runtime.decode_embedding(subset(runtime, levels, [scale - 1]), frames, "", 0.0)
+    features = runtime.decode_embedding(subset(runtime, levels, frames, [scale - 1]), frames, "", 0.0)
     motion = Motion(from_features67(runtime.normaliser.invert(features)))
     return Decoded(motion, features, None, 0.0, 1, time.perf_counter() - began, f"only:{scale}")
 
@@ -102,11 +102,12 @@ def _in_examples(
 
 
 def _in_clips(analysis: StoredAnalysis, scale: int, code: int) -> list[Occurrence]:
-    size = analysis.sizes[scale - 1]
-    places = [(analysis.clips[row], position) for row, position in analysis.where_used(scale - 1, code)]
+    places = [(analysis.clips[row], row, position) for row, position in analysis.where_used(scale - 1, code)]
     return [
-        _occurrence(clip.id, "clip", f"{clip.caption} ({clip.source})", position, size, clip.frames)
-        for clip, position in places
+        _occurrence(
+            clip.id, "clip", f"{clip.caption} ({clip.source})", position, analysis.count(row, scale - 1), clip.frames
+        )
+        for clip, row, position in places
     ]
 
 

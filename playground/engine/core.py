@@ -226,6 +226,8 @@ class Engine(BaseEngine):
 
     def _check_code(self, system: str, scale: int, code: int) -> None:
         sizes = self.scales(system)
+        if not sizes:
+            raise PlaygroundError(row_of(system).no_tokenizer)
         level = whole(scale, "the scale", 1, len(sizes)) - 1
         check_code(sizes[level][1], scale, code)
 

@@ -31,11 +31,15 @@ def draw_steps(
     """Yield one step a seed after every scale; without previews after the last one alone."""
     from playground.probes import decode_many, draw_scales
 
+    if runtime.diffusion is not None and edit is None:
+        yield from _denoised(runtime, prompt, frames, seeds, how, check, previews)
+        return
     entropy: list[NDArray[np.float32]] = []
     text = prompt or ""
     for drawn in draw_scales(runtime, prompt, frames, seeds, how, check, edit):
-        entropy.append(drawn.entropy)
-        if not previews and drawn.level < len(runtime.tokenizer.config.scales):
+        entropy.extend(drawn.entropy)
+        count = len(runtime.tokenizer.config.scales)
+        if not previews and drawn.level < count:
             continue
         features = decode_many(runtime, drawn.embedding, frames, text, how.guidance)
         rows = runtime.normaliser.invert(features)
@@ -46,9 +50,31 @@ def draw_steps(
                 tuple(level[row] for level in entropy),
                 Motion(from_features67(rows[row]), caption=text),
                 features[row],
+                count,
             )
             for row in range(len(seeds))
         )
+
+
+def _denoised(
+    runtime: "Runtime",
+    prompt: str | None,
+    frames: int,
+    seeds: Sequence[int],
+    how: SamplingDefaults,
+    check: Check | None,
+    previews: bool,
+) -> Iterator[tuple[GenerationStep, ...]]:
+    """The same without tokens: a step is one of denoising, and its motion what the network guesses by then."""
+    from playground.probes import draw_features
+
+    for done, count, features in draw_features(runtime, prompt, frames, seeds, how, check):
+        if previews or done == count:
+            rows, text = runtime.normaliser.invert(features), prompt or ""
+            yield tuple(
+                GenerationStep(done, (), (), Motion(from_features67(one), caption=text), own, count)
+                for one, own in zip(rows, features, strict=True)
+            )
 
 
 def finish(runtime: "Runtime", step: GenerationStep, seed: int, how: SamplingDefaults, began: float) -> Generation:

@@ -60,5 +60,5 @@ def words_by_frames(runtime: "Runtime", result: Tokenized | Generation, caption:
     if not caption:
         raise PlaygroundError("there are no words to look at; write a caption first")
     words, weights = text_attention(runtime, result.levels, result.motion.frames, caption)
-    patch = runtime.tokenizer.config.patch
+    patch = int(runtime.tokenizer.config.patch)
     return Attention(words, weights.mean(axis=(0, 1)), weights, patch, time.perf_counter() - began)

@@ -78,7 +78,7 @@ def governed(runtime: "Runtime", result: Result, scale: int, guidance: float, ch
     np.fill_diagonal(variants, opposites(runtime.codebooks()[level], ids))
     frames, text = result.motion.frames, result.caption
     old = runtime.normaliser.invert(runtime.decode(result.levels, frames, text, guidance, len(result.levels)))
-    embeddings = replaced(runtime, result.levels, level, variants)
+    embeddings = replaced(runtime, result.levels, frames, level, variants)
     rows = runtime.normaliser.invert(decode_many(runtime, embeddings, frames, text, guidance, check))
     return np.array([governed_span(one) for one in joint_differences(rows, old)], np.int64)
 
@@ -106,7 +106,7 @@ def _with_levels(
     if isinstance(result, Generation):
         how = replace(result.sampling, guidance=guidance)
         return replace(result, levels=levels, motion=motion, features=features, sampling=how)
-    parts = np.concatenate([part.numpy() for part in shares(runtime, levels)])
+    parts = np.concatenate([part.numpy() for part in shares(runtime, levels, motion.frames)])
     energy = np.full(len(levels) + 1, np.nan, np.float32)
     if len(result.features):
         energy = energies(runtime, result.features, result.caption, levels)

@@ -32,7 +32,7 @@ def place_clip(runtime: "Runtime", result: Tokenized | Generation, analysis: Sto
     """A motion in the maps of clips: the mean of its embedding over the latents (I9)."""
     began = time.perf_counter()
     _check(runtime, analysis)
-    vector = runtime.embedding(result.levels)[0].double().mean(dim=0).numpy()[None]
+    vector = runtime.embedding(result.levels, result.motion.frames)[0].double().mean(dim=0).numpy()[None]
     means = analysis.means.astype(np.float64)
     places = place(means, analysis.tsne.astype(np.float64), vector, analysis.perplexity)
     order = np.argsort(np.square(means - vector).sum(axis=1), kind="stable")[:NEAREST]
@@ -53,8 +53,9 @@ def place_tokens(runtime: "Runtime", result: Tokenized | Generation, analysis: S
 
     began = time.perf_counter()
     _check(runtime, analysis)
-    runtime.embedding(result.levels, 0)
-    vectors = np.concatenate([level[0] for level in token_vectors(runtime, [o.ids[None] for o in result.levels])])
+    frames, ids = result.motion.frames, [level.ids[None] for level in result.levels]
+    runtime.embedding(result.levels, frames, 0)
+    vectors = np.concatenate([level[0] for level in token_vectors(runtime, ids, frames)])
     scores = (vectors.astype(np.float64) - analysis.token_centre) @ analysis.token_axes.T
     reference = analysis.token_scores.astype(np.float64)
     perplexity = max(1.0, min(analysis.perplexity, (len(reference) - 1) / 3))

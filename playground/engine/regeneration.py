@@ -36,8 +36,8 @@ def alternatives(
     steps = draw_scales(
         runtime, result.caption or None, result.motion.frames, (0,), how, check, keep(result.levels, nothing)
     )
-    step = next(step for step in steps if step.level == scale)
-    guided, drawn = chances(step.logits[0, place], how)
+    step, logits = next((step, found) for step in steps if (found := step.logits_of(scale)) is not None)
+    guided, drawn = chances(logits[0, place], how)
     codes = np.argsort(-guided, kind="stable")[:count].astype(np.int64)
     chosen = int(result.levels[level].ids[place])
     return Alternatives(
@@ -48,7 +48,7 @@ def alternatives(
         probabilities=guided[codes],
         chances=drawn[codes],
         chosen_probability=float(guided[chosen]),
-        entropy=float(step.entropy[0, place]),
+        entropy=float(step.entropy[scale - 1 - step.level][0, place]),
         seconds=time.perf_counter() - began,
     )
 

@@ -31,10 +31,10 @@ def study_scales(
     from playground.probes import decode_many, shares, total
 
     began = time.perf_counter()
-    parts = shares(runtime, tokenized.levels)
+    frames, caption = tokenized.motion.frames, tokenized.caption
+    parts = shares(runtime, tokenized.levels, frames)
     chosen = [[parts[n] for n in one.levels(len(parts))] or [torch.zeros_like(parts[0])] for one in sets]
     embeddings = torch.cat([total(kept) for kept in chosen])
-    frames, caption = tokenized.motion.frames, tokenized.caption
     rows = runtime.normaliser.invert(decode_many(runtime, embeddings, frames, caption, guidance, check))
     motions = tuple(Motion(from_features67(one), caption=caption) for one in rows)
     return ScaleStudy(

@@ -42,8 +42,9 @@ class Motions:
 class Rebuilt:
     """n motions tokenized and decoded, their caption at both ends.
 
-    errors_mm: [n] mean of a motion; ids, predictions: a scale int64 [n, s_n]; likelihood: a scale [n], mean ln p of the
-    true tokens. The last two are empty without a generator.
+    errors_mm: [n] mean of a motion; ids, predictions: a scale int64 [n, s_n], -1 where a motion has fewer tokens;
+    likelihood: a scale [n], mean ln p of the true tokens. The last two are empty without a generator that has a
+    likelihood.
     """
 
     motions: Motions
@@ -158,30 +159,36 @@ class Passes:
 
     def rebuilt(self, items: Sequence[Item]) -> Rebuilt:
         """Recorded motions tokenized and decoded again; with a generator, how it would have predicted their tokens."""
-        scales = self.runtime.tokenizer.quantizer.scales
+        scales, heading = self.runtime.tokenizer.config.scales, self.runtime.heading
         motions, errors = self._nothing(len(items)), np.zeros(len(items))
         ids, predictions = np.zeros((2, len(items), sum(scales)))
         likelihood = np.zeros((len(items), len(scales)))
         for part in self._mine(items):
             batch = [items[place] for place in part]
-            given = self._cut(batch, self.runtime.tokenizer.config.heading)
+            given = self._cut(batch, heading)
             tokens, made = self._rebuild(batch, given)
             self._fill(motions, part, made)
             for place, rows, true in zip(part, made, given, strict=True):
                 errors[place] = joint_errors(from_features67(true), from_features67(rows)).mean()
-            ids[part] = np.concatenate([level.cpu().numpy() for level in tokens.ids], axis=1)
-            if self.runtime.generator is not None:
-                likelihood[part], predictions[part] = self._predict(batch, tokens)
+            real = self._real(batch)
+            ids[part] = _padded(tokens.ids, real, scales)
+            if self.predicts:
+                likelihood[part], best = self._predict(batch, tokens, real)
+                predictions[part] = _padded(best, real, scales)
             self.tally.add(len(part))
         cuts = np.cumsum(scales)[:-1]
-        there = self.runtime.generator is not None
         return Rebuilt(
             self._shared(motions),
             self.spread.total(errors),
             np.split(self.spread.total(ids).astype(np.int64), cuts, axis=1),
-            list(self.spread.total(likelihood).T) if there else [],
-            np.split(self.spread.total(predictions).astype(np.int64), cuts, axis=1) if there else [],
+            list(self.spread.total(likelihood).T) if self.predicts else [],
+            np.split(self.spread.total(predictions).astype(np.int64), cuts, axis=1) if self.predicts else [],
         )
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the generator says how likely given tokens are."""
+        return self.runtime.generator is not None and self.runtime.generator.likelihood
 
     # ---- batches --------------------------------------------------------------------------------------------------
 
@@ -195,7 +202,8 @@ class Passes:
         return self.runtime.decode_batch(embedding, [i.rows for i in batch], [i.caption for i in batch], guidance)
 
     def _generate(self, batch: Sequence[Item]) -> list[Rows]:
-        return self.decode(batch, self.draw(batch), self.guidance)
+        captions, rows, seeds = [i.caption for i in batch], [i.rows for i in batch], [i.seed for i in batch]
+        return self.runtime.make_batch(captions, rows, seeds, self.sampling, self.guidance)
 
     def _cut(self, batch: Sequence[Item], heading: str = "body") -> list[Rows]:
         return [self.library.features(i.index, heading)[i.start : i.start + i.rows] for i in batch]
@@ -211,21 +219,29 @@ class Passes:
         quantized = runtime.tokenizer.encode(features, lengths, runtime.texts(captions))
         return quantized.tokens, runtime.decode_batch(quantized.embedding, rows, captions, 0.0)
 
-    def _predict(self, batch: Sequence[Item], tokens: Any) -> tuple[Floats, NDArray[np.int64]]:
-        """Mean ln p [B, N] of the true tokens a scale, and arg-max predictions [B, S] of all scales, teacher-forced."""
+    def _real(self, batch: Sequence[Item]) -> "tuple[Tensor, ...]":
+        """Which tokens of a batch are real, bool [B, s_n] a scale."""
         import torch
 
-        generator = self.runtime.generator
-        assert generator is not None
+        from playground.tokenizers.base import level_masks
+
+        return level_masks(self.runtime.tokenizer, torch.tensor([i.rows for i in batch], device=self.runtime.device))
+
+    def _predict(
+        self, batch: Sequence[Item], tokens: Any, real: "tuple[Tensor, ...]"
+    ) -> "tuple[Floats, tuple[Tensor, ...]]":
+        """Mean ln p [B, N] of the true tokens a scale, and arg-max predictions [B, s_n] a scale, teacher-forced."""
+        import torch
+
+        generator: Any = self.runtime.generator
         text = self.runtime.texts([i.caption for i in batch], prompts=True)
         lengths = torch.tensor([i.rows for i in batch], device=self.runtime.device)
         logits = generator.logits(tokens, text, lengths)
-        true = [
-            level.double().log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0].mean(dim=1)
-            for level, ids in zip(logits, tokens.ids, strict=True)
-        ]
-        best = torch.cat([level.argmax(dim=-1) for level in logits], dim=1)
-        return torch.stack(true, dim=1).cpu().numpy(), best.cpu().numpy()
+        true = []
+        for level, ids, mask in zip(logits, tokens.ids, real, strict=True):
+            chance = level.double().log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
+            true.append((chance * mask).sum(dim=1) / mask.sum(dim=1))
+        return torch.stack(true, dim=1).cpu().numpy(), tuple(level.argmax(dim=-1) for level in logits)
 
     # ---- arrays ---------------------------------------------------------------------------------------------------
 
@@ -238,7 +254,7 @@ class Passes:
         The evaluators read rows whose heading is read off the body; those of a system with another rule take the way
         over the joints.
         """
-        if made and self.runtime.tokenizer.config.heading != "body":
+        if made and self.runtime.heading != "body":
             return self.evaluators[name].embed_motions([from_features67(one) for one in rows])
         return self.evaluators[name].embed_rows(rows)
 
@@ -256,3 +272,12 @@ class Passes:
     def _shared(self, motions: Motions) -> Motions:
         embeddings = {name: self.spread.total(array) for name, array in motions.embeddings.items()}
         return Motions(embeddings, self.spread.total(motions.sliding), self.spread.total(motions.drift))
+
+
+def _padded(ids: "Sequence[Tensor]", real: "Sequence[Tensor]", scales: Sequence[int]) -> NDArray[np.int64]:
+    """Tokens [B, s_n] a scale -> [B, sum of scales], every scale filled up to full length with -1 for no token."""
+    parts = [
+        np.pad(level.masked_fill(~mask, -1).cpu().numpy(), ((0, 0), (0, scale - level.shape[1])), constant_values=-1)
+        for level, mask, scale in zip(ids, real, scales, strict=True)
+    ]
+    return np.concatenate(parts, axis=1).astype(np.int64)

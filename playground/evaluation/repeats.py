@@ -67,11 +67,16 @@ class Repeat:
         recorded ones against other windows of the same clips.
         """
         recorded, real = self._recorded()
-        rebuilt = self.passes.rebuilt(self.items)
-        tokens = self._tokens(rebuilt)
         real |= _absent((*DRAWN, *TOKENS), "recorded motions are not made from a text or from tokens")
-        reconstruction = self._motions(rebuilt.motions, recorded) | tokens
-        reconstruction |= _absent(DRAWN, "a rebuilt motion is not drawn from a text")
+        runtime = self.passes.runtime
+        if runtime.codec is None:
+            why = f"the system {runtime.name} has no tokenizer"
+            tokens, reconstruction = _absent(TOKENS, why), _absent(KEYS, why)
+        else:
+            rebuilt = self.passes.rebuilt(self.items)
+            tokens = self._tokens(rebuilt)
+            reconstruction = self._motions(rebuilt.motions, recorded) | tokens
+            reconstruction |= _absent(DRAWN, "a rebuilt motion is not drawn from a text")
         return {"metrics": self._generated(recorded) | tokens, "real": real, "reconstruction": reconstruction}
 
     def sweep(self, scales: Sequence[float]) -> dict[str, Table]:
@@ -98,7 +103,7 @@ class Repeat:
         return recorded, self._motions(recorded, self.passes.recorded(self.again))
 
     def _generated(self, recorded: Motions) -> Table:
-        if self.passes.runtime.generator is None:
+        if not self.passes.runtime.generates:
             return _absent(KEYS, f"the system {self.passes.runtime.name} has no generator")
         prompts, asked = prompt_items(self.plan.seed, self.number)
         table = self._motions(self.passes.generated(self.items), recorded)
@@ -141,17 +146,20 @@ class Repeat:
 
     def _tokens(self, rebuilt: Rebuilt) -> Table:
         """What is measured on the tokens of recorded motions."""
-        n, codes = len(self.items), self.passes.runtime.tokenizer.quantizer.codes
+        n, runtime = len(self.items), self.passes.runtime
+        codes, ids = runtime.tokenizer.quantizer.codes, [level[level >= 0] for level in rebuilt.ids]
         table = {
             "mpjpe_mm": _entry(average(rebuilt.errors_mm, [item.rows for item in self.items]), n),
-            "usage": _entry(metrics.code_usage(rebuilt.ids, codes), n),
-            "code_perplexity": _entry(metrics.code_perplexity(rebuilt.ids, codes), n),
+            "usage": _entry(metrics.code_usage(ids, codes), n),
+            "code_perplexity": _entry(metrics.code_perplexity(ids, codes), n),
         }
-        if self.passes.runtime.generator is None:
-            why = f"the system {self.passes.runtime.name} has no generator"
-            return table | _absent(("model_perplexity_nll", "model_perplexity_argmax"), why)
+        if not self.passes.predicts:
+            why = "has no generator" if runtime.generator is None else "has a generator without a likelihood"
+            absent = ("model_perplexity_nll", "model_perplexity_argmax")
+            return table | _absent(absent, f"the system {runtime.name} {why}")
+        best = [level[level >= 0] for level in rebuilt.predictions]
         table["model_perplexity_nll"] = _entry(metrics.model_perplexity_nll(rebuilt.likelihood), n)
-        table["model_perplexity_argmax"] = _entry(metrics.model_perplexity_argmax(rebuilt.predictions, codes), n)
+        table["model_perplexity_argmax"] = _entry(metrics.model_perplexity_argmax(best, codes), n)
         return table
 
     def _multimodality(self) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from playground.analysis.passes import ClipPass, clip_passes, first_caption
+from playground.analysis.passes import ClipPass, clip_passes, first_caption, rows_of
 from playground.analysis.usage import CodeUsage
 from playground.data.library import Library
 from playground.engine import Engine, check_guidance, default_engine
@@ -94,7 +94,7 @@ def evaluate(
     campaign = set_up(system, library, split, order, engine, spread)
     base = reconstruct(engine.runtime(system), library, split, order.seed) if spread.first else {}
     plan = Plan(order.seed, order.mm_texts, order.mm_samples)
-    motions = plan.motions(len(campaign.clips), campaign.passes.runtime.generator is not None)
+    motions = plan.motions(len(campaign.clips), campaign.passes.runtime.generates)
     repeats = campaign.repeat(
         order, {"mm_texts": plan.mm_texts, "mm_samples": plan.mm_samples}, motions, progress,
         lambda number: Repeat(campaign.passes, campaign.clips, plan, number).run(),
@@ -178,22 +178,31 @@ def shipped_evaluators() -> dict[str, "Evaluator"]:
 def reconstruct(
     runtime: "Runtime", library: Library, split: str, seed: int, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """The quick part: reconstruction and code usage, first captions. Nothing is drawn; seed is only written down."""
+    """The quick part: reconstruction and code usage, first captions. Nothing is drawn; seed is only written down.
+
+    Of a system without a tokenizer it says what would be measured on; the numbers are None.
+    """
     chosen = library.split(split)
-    captions = [first_caption(library.clips[i].captions) for i in chosen]
-    passes = list(clip_passes(runtime, library, chosen, captions, progress=progress))
-    if not passes:
+    count = sum(rows_of(library.clips[i].frames) > 0 for i in chosen)
+    if not count:
         raise PlaygroundError(f"the split {split} of {library.path} holds no clip long enough to be measured")
-    by_source = errors_by_source(passes, [library.clips[one.index].source for one in passes])
-    config = runtime.tokenizer.config
-    usage = CodeUsage().fit([np.stack(level) for level in zip(*(one.ids for one in passes), strict=True)], config.codes)
-    return {
+    about = {
         "system": runtime.name,
         "checkpoint": runtime.checkpoint,
         "data": library.name,
         "split": split,
-        "n": len(passes),
+        "n": count,
         "seed": seed,
+    }
+    if runtime.codec is None:
+        none = dict.fromkeys(("mpjpe_mm", "mpjpe_mm_source_mean", "usage_all"))
+        return about | none | {"by_source": {}, "usage": [], "perplexity": []}
+    captions = [first_caption(library.clips[i].captions) for i in chosen]
+    passes = list(clip_passes(runtime, library, chosen, captions, progress=progress))
+    by_source = errors_by_source(passes, [library.clips[one.index].source for one in passes])
+    levels = [np.concatenate(level) for level in zip(*(one.ids for one in passes), strict=True)]
+    usage = CodeUsage().fit(levels, runtime.tokenizer.quantizer.codes)
+    return about | {
         "mpjpe_mm": float(np.concatenate([one.errors_mm for one in passes]).mean()),
         "mpjpe_mm_source_mean": float(np.mean([row["mpjpe_mm"] for row in by_source.values()])),
         "by_source": by_source,

@@ -56,7 +56,8 @@ def guidance_sweep(
     campaign = set_up(system, Library.open(Path(library_path)), split, order, engine, spread)
     passes, clips = campaign.passes, campaign.clips
     if passes.runtime.generator is None:
-        raise PlaygroundError(f"the system {system} has no generator; there is nothing to sweep")
+        what = "tokenizer" if passes.runtime.codec is None else "generator"
+        raise PlaygroundError(f"the system {system} has no {what}; there is nothing to sweep")
     plan = Plan(order.seed, 0, 0)
     repeats = campaign.repeat(
         order, {"scales": list(scales)}, 3 * len(clips), progress,

@@ -185,10 +185,9 @@ def draw(services: Services, wish: Wish) -> Iterator[Drawing]:
         wish.prompt, wish.seconds, system.name, wish.seeds, guidance=wish.guidance, cfg=wish.cfg,
         temperature=wish.temperature, top_k=wish.top_k, top_p=wish.top_p,
     )  # fmt: skip
-    count = len(services.scales(system.name))
     for step in steps:
         taken = time.perf_counter() - began
-        if step[0].level < count:
+        if not step[0].last:
             yield Drawing(wish, step, taken)
             continue
         finished = partial(_finish, services, wish, taken)

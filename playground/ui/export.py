@@ -135,9 +135,8 @@ def _tokens(services: Services, track: dict[str, Any], state: State) -> TokenFil
     levels = [
         LevelTokens(len(row["ids"]), int(row["codes"]), np.array(row["ids"], np.int64)) for row in track["levels"]
     ]
-    if [(level.size, level.codes) for level in levels] != services.scales(
-        system
-    ) or not 1 <= frames <= LIMITS.max_frames:
+    given = [(level.size, level.codes) for level in levels]
+    if not levels or not 1 <= frames <= LIMITS.max_frames or given != services.sizes(system, frames):
         raise PlaygroundError("only a motion with the tokens of all scales can be exported; let it finish first")
     file = TokenFile(system, services.checkpoint(system), caption_of(services, state), frames, tuple(levels))
     return TokenFile.from_json(file.to_json(), "this score")

@@ -42,7 +42,7 @@ def _view(
     shown, names = made[take], [f"Seed {seed}" for seed in wish.seeds]
     if len(made) == 1:
         names = ["After" if before else "Generated"]
-    sizes = services.scales(system.name)
+    sizes = services.sizes(system.name, shown.motion.frames)
     level, several = len(shown.levels), len(made) > 1
     growing = f"scale {level} of {len(sizes)}" if level < len(sizes) else ""
     figures = [scene.figure(BEFORE, "Before", before.motion.joints, system.name)] if before else []
@@ -52,14 +52,17 @@ def _view(
         id = f"made{n or ''}"
         figures.append(scene.figure(id, name, one.motion.joints, system.name, told, ghost_of=ghost))
     marks = [new.ids != old.ids for new, old in zip(shown.levels, before.levels, strict=False)] if before else None
-    track = score(
-        system, shown.motion.frames, shown.levels, services.palettes(system.name), shown.entropy, sizes, None, marks,
-        CHANGED,
-    )  # fmt: skip
-    if several:
+    tracks = []
+    if sizes:  # a system without a tokenizer has no score
+        palettes = services.palettes(system.name)
+        tracks.append(
+            score(system, shown.motion.frames, shown.levels, palettes, shown.entropy, sizes, None, marks, CHANGED)
+        )
+    if several and tracks:
+        track = tracks[0]
         track["name"] = f"{track['name']}, {names[take][:1].lower()}{names[take][1:]}"
     return View(
-        stage=scene.payload(figures, [track], scene=f"{wish.prompt}, {wish.seconds}"),
+        stage=scene.payload(figures, tracks, scene=f"{wish.prompt}, {wish.seconds}"),
         facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)),
         controls={"prompt": wish.prompt or "", "level": level, "count": len(sizes)},
         seconds=seconds,

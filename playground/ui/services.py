@@ -13,7 +13,7 @@ from playground.analysis.bundle import Bundle, read_bundle
 from playground.errors import PlaygroundError
 from playground.figures.stage import code_colors, message
 from playground.motion.motion import Motion
-from playground.systems import SamplingDefaults, checkpoint_path, header
+from playground.systems import SamplingDefaults, checkpoint_path, header, row_of
 from playground.ui.facts import as_sentence
 from playground.ui.view import View, read_view
 
@@ -69,12 +69,17 @@ class Services:
         return self._palettes[system]
 
     def scales(self, system: str) -> list[tuple[int, int]]:
-        """(tokens, codes) of every scale of a system."""
+        """(tokens, codes) of every scale of a system at full length; [] without a tokenizer."""
         return [(int(size), int(codes)) for size, codes in self.engine().scales(system)]
 
+    def sizes(self, system: str, frames: int) -> list[tuple[int, int]]:
+        """(tokens, codes) of every scale of a motion of so many frames; [] without a tokenizer."""
+        counts = self.engine().sizes(system, frames)
+        return [(int(size), codes) for size, (_, codes) in zip(counts, self.scales(system), strict=True)]
+
     def checkpoint(self, system: str) -> str:
-        """What a token file says of the tokenizer: 12 digits of its file's sha256, "" where there is no file."""
-        path = checkpoint_path(self.engine().assets, system, "tokenizer")
+        """What a token file says of a system: 12 digits of its first file's sha256, "" where there is no file."""
+        path = checkpoint_path(self.engine().assets, system, row_of(system).parts[0])
         if not path.is_file():
             return ""
         with open(path, "rb") as file:
@@ -93,9 +98,10 @@ class Services:
                 mark.update(json.dumps([system.name, heads], sort_keys=True).encode())
         return mark.hexdigest()[:16]
 
-    def shipped(self) -> list["SystemInfo"]:
-        """The systems whose checkpoint is here."""
-        return [system for system in self.engine().systems() if system.checkpoint == "shipped"]
+    def shipped(self, part: str = "") -> list["SystemInfo"]:
+        """The systems whose checkpoint is here; with a part ("tokenizer" or "generator") those that have it."""
+        there = [system for system in self.engine().systems() if system.checkpoint == "shipped"]
+        return [system for system in there if not part or getattr(system, part)]
 
     def preset(self, room: str, example: str) -> View | None:
         """The stored result of a room for an example, or None."""
@@ -125,8 +131,8 @@ class Services:
             return SamplingDefaults()
 
     def default_system(self) -> "SystemInfo":
-        """The first shipped system that can generate, or else the first shipped one; PlaygroundError if none is."""
+        """The first shipped system that tokenizes and generates, or else the first one; PlaygroundError if none is."""
         shipped = self.shipped()
         if not shipped:
             raise PlaygroundError("no trained system is shipped with this copy; train one with: make train")
-        return next((system for system in shipped if system.generator), shipped[0])
+        return next((system for system in shipped if system.generator and system.tokenizer), shipped[0])

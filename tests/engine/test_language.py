@@ -45,7 +45,7 @@ def test_tokens_flip_where_the_words_move_the_latent(engine, tokenized):
     for row, text in enumerate((tokenized.caption, "", WRONG)):
         latent = model.latents(x, lengths, runtime.text(text))
         model.quantizer.codebooks[0].vectors[row] = latent.mean(dim=1)[0]
-    other = replace(runtime, tokenizer=model)
+    other = replace(runtime, codec=model)
     levels, _ = other.encode(tokenized.features, tokenized.caption)
     found = compare_captions(other, replace(tokenized, levels=levels), WRONG, None)
     assert [int(one[0].ids[0]) for one in (found.captioned, found.bare, found.misled)] == [0, 1, 2]

@@ -96,7 +96,9 @@ def test_a_clip_is_placed_where_its_own_tokens_say(engine, generation):
         np.testing.assert_allclose(placed.pca, analysis.pca[row], atol=1e-4)
         assert placed.nearest[0] == analysis.clips[row].id and placed.each == "clip"
     found = engine.place(generation)
-    vector = engine.runtime(SYSTEM).embedding(generation.levels)[0].double().mean(dim=0).numpy()
+    vector = (
+        engine.runtime(SYSTEM).embedding(generation.levels, generation.motion.frames)[0].double().mean(dim=0).numpy()
+    )
     np.testing.assert_allclose(found.pca, (vector - analysis.pca_centre) @ analysis.pca_axes.T, atol=1e-5)
     assert np.isfinite(found.tsne).all() and len(found.nearest) == min(8, len(analysis))
 

@@ -54,7 +54,13 @@ def test_one_scale_and_the_rest_add_up(engine, tokenized):
     runtime = engine.runtime(tokenized.system)
     for n in range(3):
         rest = [m for m in range(3) if m != n]
-        both = subset(runtime, tokenized.levels, [n]) + subset(runtime, tokenized.levels, rest)
+        both = subset(runtime, tokenized.levels, tokenized.motion.frames, [n]) + subset(
+            runtime, tokenized.levels, tokenized.motion.frames, rest
+        )
         np.testing.assert_allclose(both[0].numpy(), tokenized.embedding, atol=1e-4)
-        np.testing.assert_allclose(subset(runtime, tokenized.levels, [n])[0].numpy(), tokenized.per_level[n], atol=1e-5)
-    assert not subset(runtime, tokenized.levels, []).any()
+        np.testing.assert_allclose(
+            subset(runtime, tokenized.levels, tokenized.motion.frames, [n])[0].numpy(),
+            tokenized.per_level[n],
+            atol=1e-5,
+        )
+    assert not subset(runtime, tokenized.levels, tokenized.motion.frames, []).any()

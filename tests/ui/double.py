@@ -93,6 +93,9 @@ class FakeEngine(Drawing, Studies):
     def scales(self, system: str) -> list[tuple[int, int]]:
         return list(zip(SIZES, CODES, strict=True))
 
+    def sizes(self, system: str, frames: int) -> tuple[int, ...]:
+        return SIZES
+
     def codebooks(self, system: str) -> list[NDArray[np.float64]]:
         rng = np.random.default_rng(3)
         return [rng.normal(size=(codes, 8)) for codes in CODES]
@@ -153,7 +156,7 @@ class FakeEngine(Drawing, Studies):
             self.pause()
             entropy.append(rng.uniform(0, 5, SIZES[n - 1]).astype(np.float32))
             motion = shaken(clean, 0.4 * 0.7**n)
-            yield GenerationStep(n, levels[:n], tuple(entropy), motion, _features(motion))
+            yield GenerationStep(n, levels[:n], tuple(entropy), motion, _features(motion), len(levels))
 
     def guidance_pair(self, result: Tokenized, caption: str | None = None) -> GuidancePair:
         self.calls.append("guidance_pair")

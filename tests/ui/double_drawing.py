@@ -59,7 +59,7 @@ class Drawing:
                 levels[n] = LevelTokens(old.size, old.codes, ids)
         for n in range(1, len(levels) + 1):
             kept, entropy = tuple(levels[:n]), generation.entropy[:n]
-            yield GenerationStep(n, kept, entropy, _moved(generation.motion, 0.02), generation.features)
+            yield GenerationStep(n, kept, entropy, _moved(generation.motion, 0.02), generation.features, len(levels))
 
     def edit(
         self, source: Any, span: Sequence[int] | None, prompt: str | None, seed: int = 0, kind: str = "inpaint",

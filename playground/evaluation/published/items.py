@@ -25,16 +25,17 @@ class Item:
     what: str
     compute: Compute
     draws: bool = True  # is there nothing to measure without a generator?
+    tokenless: bool = False  # is there something to measure without a tokenizer?
 
 
 ITEMS: dict[str, Item] = {
     item.name: item
     for item in (
-        Item("evaluation", "every metric (Tables 1, 2, 3, Fig 2, perplexity)", measures.evaluation, draws=False),
+        Item("evaluation", "every metric (Tables 1, 2, 3, Fig 2, perplexity)", measures.evaluation, False, True),
         Item("guidance_sweep", "quality against g (Fig 5, Table 5)", measures.sweep),
         Item("free_form", "tokens with and without text, read with and without it (Table 8)", measures.free_form),
         Item("edits", "the benchmark masks (Fig 11)", motions.edits),
-        Item("strips", "motions of prompts (Figs 4, 9, 10)", motions.strips),
+        Item("strips", "motions of prompts (Figs 4, 9, 10)", motions.strips, tokenless=True),
         Item("inference_time", "seconds a motion (Table 9)", timing.inference_time),
     )
 }
@@ -57,7 +58,10 @@ def item_of(name: str) -> Item:
 
 def can_measure(item: Item, system: str, engine: Engine) -> bool:
     """Whether the files that an item needs are there."""
-    parts = ("tokenizer", "generator") if item.draws else ("tokenizer",)
+    row = row_of(system)
+    if not (item.tokenless or row.tokenizer) or not (row.generator or not item.draws):
+        return False
+    parts = row.parts if item.draws else row.needed
     return all(checkpoint_path(engine.assets, system, part).is_file() for part in parts)
 
 

@@ -57,7 +57,8 @@ def free_form(system: str, settings: Settings, engine: Engine, progress: Progres
     order.check()
     campaign = set_up(system, settings.opened(), settings.split, order, engine, Spread())
     if campaign.passes.runtime.generator is None:
-        raise PlaygroundError(f"the system {system} has no generator; there is nothing to draw")
+        what = "tokenizer" if campaign.passes.runtime.codec is None else "generator"
+        raise PlaygroundError(f"the system {system} has no {what}; there is nothing to draw")
     plan, clips = Plan(settings.seed, 0, 0), campaign.clips
     ways = {name: [reading.text, reading.guidance] for name, reading in READINGS.items()}
     tables = campaign.repeat(
