@@ -3,39 +3,29 @@
 import math
 
 import torch
-from torch.nn import functional as F
 
 from playground.generators.masked import MaskedConfig, MaskedGenerator, MaskedResidual
 from playground.generators.masked_scales import MaskedScales, MaskedScalesConfig, MaskedScalesGenerator
 from playground.text.encoders import TextFeatures
-from playground.tokenizers.base import Tokens
-from playground.tokenizers.quantizers import MultiScaleQuantizer
+from playground.tokenizers.convolutional import ConvConfig, ConvTokenizer, build_conv
 from tests.tiny import tiny_tokenizer
 
 SMALL = {"width": 16, "depth": 2, "heads": 2, "hidden": 24, "dropout": 0.0, "text_width": 20, "code_width": 12}
 KINDS = ("momask", "momask-lgtok", "momask++", "momask++-cross")
 
 
-class RaggedTokenizer:
-    """A token every four frames at the finest level; the level is `divisor` times coarser. Embeds by its quantizer."""
-
-    def __init__(self, divisors: tuple[int, ...]) -> None:
-        self.divisors = divisors
-        self.quantizer = MultiScaleQuantizer(self.sizes(48), (9,) * len(divisors), 12, phi="identity")
-        for book in self.quantizer.codebooks:
-            book.vectors.normal_(generator=torch.Generator().manual_seed(1))
-
-    def sizes(self, frames: int) -> tuple[int, ...]:
-        return tuple(max(1, frames // 4 // divisor) for divisor in self.divisors)
-
-    def embed(self, tokens: Tokens, levels: int | None = None, lengths: torch.Tensor | None = None) -> torch.Tensor:
-        rows = torch.zeros(len(lengths), int(lengths.max()) // 4, 12)
-        for row, frames in enumerate(lengths.tolist()):
-            for level, ids in enumerate(tokens.ids):
-                size, latents = self.sizes(frames)[level], frames // 4
-                vectors = self.quantizer.codebooks[level].vectors[ids[row, :size]][None].transpose(1, 2)
-                rows[row, :latents] += F.interpolate(vectors, latents, mode="linear")[0].T
-        return rows
+def tiny_conv(divisors: tuple[int, ...], shared: bool) -> ConvTokenizer:
+    """A convolutional tokenizer of at most 12 latents with filled codebooks; tokens follow a motion's length."""
+    config = ConvConfig(
+        max_frames=48, width=8, heads=2, dropout=0.0, divisors=divisors, codes=(9,) * len(divisors), code_width=12,
+        shared=shared,
+    )  # fmt: skip
+    with torch.random.fork_rng():
+        torch.manual_seed(1)
+        model = build_conv(config).eval().requires_grad_(False)
+        for book in model.quantizer.codebooks:
+            book.vectors.normal_()
+    return model
 
 
 def strong(network, seed=0):
@@ -51,7 +41,7 @@ def tiny(kind: str, seed: int = 0, **changes):
     """A generator of a kind with random weights."""
     if kind == "momask":
         config = MaskedConfig(**(SMALL | {"scales": (12,) * 3, "codes": (9,) * 3, "iterations": 4} | changes))
-        return MaskedGenerator(strong(MaskedResidual(config), seed), RaggedTokenizer((1, 1, 1)))
+        return MaskedGenerator(strong(MaskedResidual(config), seed), tiny_conv((1, 1, 1), shared=False))
     if kind == "momask-lgtok":
         config = MaskedConfig(**(SMALL | {"scales": (6,) * 3, "codes": (9,) * 3, "iterations": 4} | changes))
         tokenizer = tiny_tokenizer(scales=(6,) * 3, codes=(9,) * 3, phi="identity", metric="euclidean")
@@ -59,7 +49,7 @@ def tiny(kind: str, seed: int = 0, **changes):
     variant = "cross" if kind.endswith("cross") else "in-context"
     base = {"scales": (3, 6, 12), "codes": (9,) * 3, "iterations": 6, "variant": variant, "null_words": 3}
     network = MaskedScales(MaskedScalesConfig(**(SMALL | base | changes)))
-    return MaskedScalesGenerator(strong(network, seed), RaggedTokenizer((4, 2, 1)))
+    return MaskedScalesGenerator(strong(network, seed), tiny_conv((4, 2, 1), shared=True))
 
 
 def one_text(text: TextFeatures, row: int) -> TextFeatures:

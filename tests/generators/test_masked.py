@@ -153,14 +153,16 @@ def test_free_form_reads_a_text_of_zeros():
 
 
 @pytest.mark.parametrize("kind", ["momask", "momask-lgtok"])
-def test_residual_levels_are_drawn_from_what_the_transformer_says(kind):
+@pytest.mark.parametrize("cfg", [5.0, 2.0])  # while drawing and while editing, where the masked half has 4 (B3)
+def test_residual_levels_are_drawn_from_what_the_transformer_says(kind, cfg):
     generator, text = tiny(kind), text_features((4, 2))
-    steps = list(generator.steps(text, LENGTHS, Sampling(seed=1, cfg=4.0, top_k=0.1)))
     net, real = generator.network.residual, level_masks(generator.tokenizer, LENGTHS)[0]
+    edit = Edit(Tokens((real.long(),) * 3, (9,) * 3), (real,) * 3) if cfg == 2.0 else None
+    steps = list(generator.steps(text, LENGTHS, Sampling(seed=1, cfg=4.0, top_k=0.1), edit))
     for level in (1, 2):
         ids, which = steps[-1].tokens.ids[:level], torch.full((2,), level)
         plain, null = (net(ids, which, real, text.pooled * on) for on in (1, 0))
-        expected = null + 5.0 * (plain - null)
+        expected = null + cfg * (plain - null)
         torch.testing.assert_close(steps[level].logits, expected, atol=1e-3, rtol=1e-4)
         top = expected.topk(1, dim=-1).indices[..., 0]  # a tenth of nine codes is one
         assert torch.equal(steps[level].tokens.ids[level][real], top[real])

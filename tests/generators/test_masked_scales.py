@@ -151,3 +151,13 @@ def test_the_residual_half_learns_low_levels_more_often(monkeypatch):
     for level in range(1, 6):  # round((1 - cos(pi u / 2)) * 4) + 1 == level for u between these
         low, high = (2 / math.pi * math.acos(1 - min(max((level - 1 + x) / 4, 0), 1)) for x in (-0.5, 0.5))
         assert levels.count(level) / 600 == pytest.approx(high - low, abs=0.06)
+
+
+def test_the_residual_half_loses_more_texts_while_it_trains(monkeypatch):
+    network, seen = tiny("momask", residual_drop=1.0).network, []
+    forward = network.residual.forward
+    monkeypatch.setattr(network.residual, "forward", lambda *inputs: (seen.append(inputs[3]), forward(*inputs))[1])
+    batch = toy_batch(tiny("momask"))
+    for training in (True, False):
+        network.train(training).training_loss(batch, None, torch.Generator().manual_seed(1))
+    assert not seen[0].any() and torch.equal(seen[1], batch.text.pooled)
