@@ -125,7 +125,7 @@ Command = Callable[[str, Callable[..., None], str], argparse.ArgumentParser]
 
 
 def _for_models(command: Command) -> None:
-    """app, systems, tokenize, decode, generate."""
+    """app, systems, tokenize, decode, generate, rewrite."""
     sub = command("app", commands.app, "start the web app")
     sub.add_argument("--host", default="127.0.0.1", type=_text)
     sub.add_argument("--port", default=7860, type=_port)
@@ -156,6 +156,11 @@ def _for_models(command: Command) -> None:
     sub.add_argument("--guidance", type=_number, help="guidance scale g of the decoder (default: the system's own)")
     sub.add_argument("--out", type=_output(*MOTION_FILES), required=True, metavar="FILE", help=".npz, .bvh or .glb")
     sub.add_argument("--json", dest="to", type=_output(), metavar="TOKENS.json", help="also write the tokens")
+
+    sub = command("rewrite", commands.rewrite, "a prompt before it is used: normalised, in timed steps, in many words")
+    sub.add_argument("prompt", metavar="PROMPT", type=_text)
+    sub.add_argument("--rules", action="store_true", help="do not ask the language model of PLAYGROUND_LLM_URL")
+    sub.add_argument("--json", dest="as_json", action="store_true", help="as JSON")
 
 
 def _for_data(command: Command) -> None:

@@ -118,6 +118,22 @@ def generate(
         _write_text(made.token_file().to_json(), to)
 
 
+def rewrite(prompt: str, rules: bool, as_json: bool) -> None:
+    """A prompt as a caption, as timed steps and in many words."""
+    from playground.text import endpoint, rewriting
+
+    made = rewriting.rewrite(prompt, None if rules else endpoint.from_environment())
+    if as_json:
+        say(_json(made.record()))
+        return
+    say(made.normalised)
+    for step in made.steps:
+        say(f"  {step.seconds:4.1f} s  {step.text}")
+    say(made.expressive)
+    for note in made.notes:
+        say(f"  - {note}")
+
+
 def prepare(source: str, root: Path | None, out: Path) -> None:
     """Published data to library."""
     from playground.data import sources
