@@ -1,8 +1,9 @@
 import math
 
+import pytest
 import torch
 
-from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention, split_heads
+from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention, prefix_pattern, split_heads
 from playground.nn.rope import rope_angles
 
 
@@ -92,3 +93,27 @@ def test_recorded_weights_are_what_the_values_are_multiplied_with():
     torch.testing.assert_close(again, plain, atol=1e-6, rtol=1e-5)
     torch.testing.assert_close(record[0].sum(-1), torch.ones(2, 2, 5))
     assert not record[0][1, :, :, 2:].any()
+
+
+@pytest.mark.parametrize("causal_prefix", [False, True])
+def test_prefix_pattern_equals_its_rules(causal_prefix):
+    real = torch.tensor([[True, True, True], [True, False, False]])
+    pattern = prefix_pattern(real, 4, causal_prefix=causal_prefix)
+    for b in range(2):
+        for i in range(7):
+            for j in range(7):
+                both_prefix = i < 3 and j < 3 and not causal_prefix
+                seen = (j <= i or both_prefix) and (j >= 3 or bool(real[b, j]))
+                assert bool(pattern[b, 0, i, j]) == (seen or i == j)
+
+
+def test_self_attention_records_the_weights_of_a_pattern():
+    torch.manual_seed(6)
+    layer, x = SelfAttention(8, 2).eval().requires_grad_(False), torch.randn(2, 5, 8)
+    pattern = prefix_pattern(torch.tensor([[True, True], [True, False]]), 3)
+    record: list[torch.Tensor] = []
+    out = layer(x, mask=pattern, record=record)
+    value = split_heads(layer.qkv(x).chunk(3, dim=-1)[2], 2)
+    again = layer.out((record[0] @ value).transpose(1, 2).flatten(-2))
+    torch.testing.assert_close(again, out, atol=1e-6, rtol=1e-5)
+    assert not record[0].masked_select(~pattern.expand(-1, 2, -1, -1)).any()
