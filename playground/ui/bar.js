@@ -1,4 +1,4 @@
-/* The line above the rooms: copies the link and the script of the room that is shown. */
+/* The line above the rooms: copies the link and the script of the room that is shown; takes it to Compare and back. */
 (() => {
   if (window.mtpBar) return;
 
@@ -18,7 +18,7 @@
     }
   }
 
-  window.mtpBar = (element, scriptOf) => {
+  window.mtpBar = (element, scriptOf, compareOf) => {
     const find = (selector) => element.querySelector(selector);
     const part = (name) => find(`.mtp-tools [data-part="${name}"]`);
     const dialog = find('dialog'), code = find('code'), note = find('.mtp-dialog-note'), toast = find('.mtp-toast');
@@ -54,6 +54,31 @@
     find('[data-do="copy"]').addEventListener('click', copyCode);
     find('[data-do="close"]').addEventListener('click', () => dialog.close());
     dialog.addEventListener('click', (event) => event.target === dialog && dialog.close());
+
+    // The switch in a room's panel, and the way back to that room, which stands as it was left.
+    let origin = null;
+    const name = (room) => document.getElementById(`room-${room}-button`).textContent.trim();
+    async function compare(button) {
+      const room = mtpState.room;
+      button.disabled = true;
+      const answer = await compareOf(mtpState.query() || '?').catch(() => null);
+      button.disabled = false;
+      if (!answer?.query) return say(answer?.error ?? 'The playground did not answer; try again.');
+      origin = room;
+      mtpState.open(answer.query);
+      leadBack(`Back to ${name(room)}`);
+    }
+    // The panel of Compare is only there once its tab has been opened.
+    function leadBack(textContent, tries = 600) {
+      const back = document.querySelector('[data-part="back"]');
+      if (back) Object.assign(back, { hidden: false, textContent });
+      else if (tries) requestAnimationFrame(() => leadBack(textContent, tries - 1));
+    }
+    document.addEventListener('click', (event) => {
+      const button = event.target.closest?.('.mtp-lead [data-part]');
+      if (button?.dataset.part === 'compare') compare(button);
+      if (button?.dataset.part === 'back' && origin) mtpState.enter(origin);
+    });
 
     // On a phone the tools are a menu under "⋯", which closes behind a choice.
     const unfold = (open) => {

@@ -1,7 +1,8 @@
 """The line above the rooms: the name, and what works in every room: copy the link, copy as Python, export, tour, dark.
 
 A room does nothing for the bar: the link and the script come from the address (state.py, code.py), an export from what
-stands on the room's stage and in its charts (export.py). The browser half is bar.js, export.js and tour.js.
+stands on the room's stage and in its charts (export.py). The switch to Compare in a room's panel (layout.py) and the
+way back work from here too, by carry.py. The browser half is bar.js, export.js and tour.js.
 """
 
 from typing import Any
@@ -9,12 +10,14 @@ from typing import Any
 import gradio as gr
 
 from playground.errors import PlaygroundError
+from playground.ui.carry import compared_with
 from playground.ui.code import python_for
 from playground.ui.complete import complete
 from playground.ui.export import export_channel
 from playground.ui.facts import as_sentence
 from playground.ui.services import Services
-from playground.ui.state import parse
+from playground.ui.state import State, parse
+from playground.ui.state import query as query_of
 
 _BAR = """
 <header class="mtp-header"><h1>{title}</h1>
@@ -36,7 +39,7 @@ _BAR = """
 """
 _ON_LOAD = """
 const start = () => window.mtpBar
-  ? mtpBar(element, (query) => server.script_of(query))
+  ? mtpBar(element, (query) => server.script_of(query), (query) => server.compare_of(query))
   : requestAnimationFrame(start);
 start();
 """
@@ -48,17 +51,33 @@ def bar(services: Services, title: str) -> None:
     def script_of(query: Any) -> dict[str, str]:
         return script(services, query)
 
+    def compare_of(query: Any) -> dict[str, str]:
+        return comparison(services, query)
+
     gr.HTML(
         _BAR.format(title=title), elem_id="mtp-header", apply_default_css=False, js_on_load=_ON_LOAD,
-        server_functions=[script_of],
+        server_functions=[script_of, compare_of],
     )  # fmt: skip
     export_channel(services)
 
 
 def script(services: Services, query: Any) -> dict[str, str]:
     """{"code": the script of the state that an address holds} or {"error": one sentence}."""
-    state = parse(str(query[0] if isinstance(query, list) and query else query))
+    state = _state(query)
     try:
         return {"code": python_for(state.room, complete(services, state))}
     except PlaygroundError as error:
         return {"error": as_sentence(str(error))}
+
+
+def comparison(services: Services, query: Any) -> dict[str, str]:
+    """{"query": the address of Compare that goes on from an address} or {"error": one sentence}."""
+    try:
+        return {"query": query_of(compared_with(services, _state(query)))}
+    except PlaygroundError as error:
+        return {"error": as_sentence(str(error))}
+
+
+def _state(query: Any) -> State:
+    """The state of an address as the browser sends it."""
+    return parse(str(query[0] if isinstance(query, list) and query else query))

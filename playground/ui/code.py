@@ -3,29 +3,25 @@
 `python_for(room, state)` wants a complete state, as `complete(services, state)` makes one: what the address leaves to
 the page (the opening example, a motion's own caption, the system's own sampling) is filled in, so the script says it.
 A new room adds its rows to state.CONTROLS, a function here, an entry in SCRIPTS, and a line in complete.py where it
-opens with something of its own. Texts enter a script as Python literals, never as they are.
+opens with something of its own. The lines that several rooms need are in codelines.py.
 """
 
-import json
 import textwrap
 from collections.abc import Callable
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
-from playground.ui.comparing import MOTION, VARIATIONS, Setting
-from playground.ui.drawing import MADE, Change, Wish, read_changes, read_name
+from playground.ui.codelines import TOKENS, changed, drawn, in_words, literal, number, opened, remade, scale_set
+from playground.ui.comparing import EDIT, PROMPT, VARIATIONS, Setting
+from playground.ui.drawing import MADE, read_changes
 from playground.ui.placing import SECONDS, SEED
-from playground.ui.state import OWN_FILE, Scales, State, Token, controls_of
+from playground.ui.state import OWN_FILE, State, Token
 
 _SLIDES = """
 for name, result in results.items():
     print(f"{name}: feet slide {foot_sliding(result.motion.joints):.0f} mm/s")
 """
 _MADE = "Made by the Motion Token Playground; run it with the Python that the playground is installed in."
-_TOKENS = """
-for number, level in enumerate({name}.levels, 1):
-    print(f"scale {{number}}:", *level.ids)
-"""
 
 
 def python_for(room: str, state: State) -> str:
@@ -38,12 +34,12 @@ def python_for(room: str, state: State) -> str:
 
 def _tokenize(state: State) -> tuple[str, str]:
     scales = state["scales"]
-    asked, words = ("", "all scales") if scales is None else (f", scales={_scales(scales)}", _in_words(scales))
+    asked, words = ("", "all scales") if scales is None else (f", scales={scale_set(scales)}", in_words(scales))
     return "A motion becomes tokens, and comes back.", (
-        _opened(state)
-        + f"tokens = engine.tokenize(motion, {_literal(state['caption'])}, system={_literal(state.system)})\n"
+        opened(state)
+        + f"tokens = engine.tokenize(motion, {literal(state['caption'])}, system={literal(state.system)})\n"
         + f"back = engine.reconstruct(tokens{asked})\n"
-        + _TOKENS.format(name="tokens")
+        + TOKENS.format(name="tokens")
         + f'print(f"MPJPE, {words}: {{back.mpjpe_mm:.1f}} mm")\n'
         + _closer(state)
     )
@@ -62,7 +58,7 @@ def _closer(state: State) -> str:
     if state["wrong"]:
         text += (
             f"\n# What the words do: the same motion with its caption, without words, with wrong ones.\n"
-            f"language = engine.language(tokens, {_literal(state['wrong'])})\n"
+            f"language = engine.language(tokens, {literal(state['wrong'])})\n"
             'print(f"other tokens: {language.bare_share:.0%} without words, {language.misled_share:.0%} with wrong '
             'ones")\n'
         )
@@ -75,45 +71,25 @@ def _generate(state: State) -> tuple[str, str]:
         "from pathlib import Path\n\nfrom playground.engine import default_engine\n"
         "from playground.motion.formats import write_motion\n\n"
         "engine = default_engine()\n"
-        + _drawn(state, seed, takes)
-        + "".join(f"made = engine.regenerate({_changed(one)})\n" for one in read_changes(state["changes"]))
-        + _TOKENS.format(name="made")
+        + drawn(state, seed, takes)
+        + "".join(f"made = engine.regenerate({changed(one)})\n" for one in read_changes(state["changes"]))
+        + TOKENS.format(name="made")
         + 'write_motion(made.motion, Path("generated.bvh"))\n'
     )
 
 
-def _drawn(state: State, seed: int, takes: int) -> str:
-    """The lines that give `made`: one motion, or one of several that are drawn together."""
-    prompt = "None" if state["free"] else _literal(state["prompt"])
-    seeds = Wish.seeds_of(seed, takes)
-    given = {"seconds": _number(state["seconds"]), "system": _literal(state.system)}
-    given |= {"seed": str(seed)} if takes == 1 else {"seeds": str(seeds)}
-    names = {"guidance": "g", "cfg": "s", "temperature": "temperature", "top_k": "topk", "top_p": "topp"}
-    given |= {name: _number(state[key]) for name, key in names.items()}
-    arguments = f"    {prompt},\n" + "".join(f"    {name}={value},\n" for name, value in given.items())
-    if takes == 1:
-        return f"made = engine.generate(\n{arguments})\n"
-    return f"takes = engine.generate_many(\n{arguments})\nmade = takes[{min(int(state['take']), takes - 1)}]\n"
-
-
-def _changed(one: Change) -> str:
-    if one.code is None:
-        return f"made, scale={one.scale}, seed={one.seed}"
-    return f"made, scale={one.scale}, position={one.position}, code={one.code}"
-
-
 def _guidance(state: State) -> tuple[str, str]:
-    g = _number(state["g"])
+    g = number(state["g"])
     return "The same tokens, read with the caption and without; g exaggerates the difference.", (
-        _opened(state)
-        + f"tokens = engine.tokenize(motion, {_literal(state['caption'])}, system={_literal(state.system)})\n"
+        opened(state)
+        + f"tokens = engine.tokenize(motion, {literal(state['caption'])}, system={literal(state.system)})\n"
         + f"guided = engine.reconstruct(tokens, guidance={g})\n"
         + f"""
 # The same by hand: both decodes, blended. Rows are normalised; the rest of engine.reconstruct turns them into joints.
 pair = engine.guidance_pair(tokens)
 blended = (1 + {g}) * pair.conditional - {g} * pair.unconditional
 """
-        + _TOKENS.format(name="tokens")
+        + TOKENS.format(name="tokens")
         + 'print(f"MPJPE: {guided.mpjpe_mm:.1f} mm")\n'
     )
 
@@ -121,10 +97,10 @@ blended = (1 + {g}) * pair.conditional - {g} * pair.unconditional
 def _embedding_map(state: State) -> tuple[str, str]:
     return "A motion of the embedding map: where it lies, its tokens, the motion that they stand for.", (
         "from playground.analysis.bundle import read_bundle\nfrom playground.engine import ASSETS, default_engine\n\n"
-        f'bundle = read_bundle(ASSETS / "analysis", {_literal(state.system)})\n'
-        f"row = bundle.position({_literal(state['motion'])})\n"
+        f'bundle = read_bundle(ASSETS / "analysis", {literal(state.system)})\n'
+        f"row = bundle.position({literal(state['motion'])})\n"
         "tokens = bundle.token_file(row)\nmotion = default_engine().decode(tokens).motion\n"
-        + _TOKENS.format(name="tokens")
+        + TOKENS.format(name="tokens")
         + 'print("t-SNE:", *bundle.tsne[row], " PCA:", *bundle.pca[row])\n'
         'print(f"{motion.frames} frames of: {tokens.caption}")\n' + _placed(state)
     )
@@ -132,18 +108,18 @@ def _embedding_map(state: State) -> tuple[str, str]:
 
 def _placed(state: State) -> str:
     """A new point on the maps, where one was placed: an example, the visitor's own file or a generation."""
-    system, words, wanted = _literal(state.system), state["prompt"], str(state["place"] or "")
+    system, words, wanted = literal(state.system), state["prompt"], str(state["place"] or "")
     if words:
-        made = f"new = engine.generate({_literal(words)}, {_number(SECONDS)}, system={system}, seed={SEED})\n"
+        made = f"new = engine.generate({literal(words)}, {number(SECONDS)}, system={system}, seed={SEED})\n"
     elif wanted.startswith(OWN_FILE):
         made = (
             "from pathlib import Path\n\nfrom playground.motion.formats import read_motion\n\n"
-            f"mine = read_motion(Path({_literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n"
+            f"mine = read_motion(Path({literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n"
             f"new = engine.tokenize(mine.slice(0, {LIMITS.max_frames + 1}), mine.caption, system={system})\n"
         )
     elif wanted:
         made = (
-            f"(example,) = [one for one in engine.examples() if one.id == {_literal(wanted)}]\n"
+            f"(example,) = [one for one in engine.examples() if one.id == {literal(wanted)}]\n"
             f"new = engine.tokenize(example.motion().slice(0, {LIMITS.max_frames + 1}), example.caption, "
             f"system={system})\n"
         )
@@ -158,8 +134,8 @@ def _placed(state: State) -> str:
 def _codebooks(state: State) -> tuple[str, str]:
     return "Which codes are used, how evenly, at which scale.", (
         "from playground.analysis.bundle import read_bundle\nfrom playground.engine import ASSETS\n\n"
-        f'bundle = read_bundle(ASSETS / "analysis", {_literal(state.system)})\nusage = bundle.usage\n'
-        f"order = {_literal(state['order'])}\n"
+        f'bundle = read_bundle(ASSETS / "analysis", {literal(state.system)})\nusage = bundle.usage\n'
+        f"order = {literal(state['order'])}\n"
         "frequencies = [usage.relative(scale, order) for scale in range(len(bundle.sizes))]\n\n"
         "print(bundle.provenance)\n"
         "for scale, (tokens, codes) in enumerate(zip(bundle.sizes, bundle.codes)):\n"
@@ -174,7 +150,7 @@ def _code_of(state: State) -> str:
     system, *places = str(state["code"] or "").rsplit(".", 2)
     if len(places) != 2 or not all(number.isascii() and number.isdigit() for number in places):
         return ""
-    place = f"{_literal(system)}, scale={int(places[0])}, code={int(places[1])}"
+    place = f"{literal(system)}, scale={int(places[0])}, code={int(places[1])}"
     return (
         "\nfrom playground.engine import default_engine\n\n"
         f"like = default_engine().neighbours({place})\nprototype = default_engine().prototype({place})\n"
@@ -183,20 +159,20 @@ def _code_of(state: State) -> str:
 
 
 def _edit(state: State) -> tuple[str, str]:
-    given = {"prompt": _literal(state["prompt"]), "seed": str(state["seed"]), "kind": _literal(state["kind"])}
+    given = {"prompt": literal(state["prompt"]), "seed": str(state["seed"]), "kind": literal(state["kind"])}
     edges = [state["from"], state["to"]]
     known = None not in edges
     span = f"({', '.join(str(round(float(edge) * LIMITS.fps)) for edge in edges)})" if known else "None"
     made = str(state["motion"]).startswith(MADE)
     if not made:
-        given |= {"system": _literal(state.system), "caption": _literal(state["caption"])}
-    given |= {"anchor": _literal(state["anchor"]), "measured": str(bool(state["measured"]))}
-    given |= {"guidance": _number(state["g"]), "cfg": _number(state["s"])}
+        given |= {"system": literal(state.system), "caption": literal(state["caption"])}
+    given |= {"anchor": literal(state["anchor"]), "measured": str(bool(state["measured"]))}
+    given |= {"guidance": number(state["g"]), "cfg": number(state["s"])}
     arguments = "".join(f"    {name}={value},\n" for name, value in given.items())
     return "A span of a motion drawn anew; the frames outside stay as they were.", (
-        (_remade(state) if made else _opened(state))
+        (remade(state) if made else opened(state))
         + f"edited = engine.edit(\n    {'made' if made else 'motion'},\n    {span},\n{arguments})\n"
-        + _TOKENS.format(name="edited")
+        + TOKENS.format(name="edited")
         + "assert (edited.motion.joints[edited.kept] == edited.source.joints[edited.kept]).all()\n"
         + "for seam in edited.seams:\n"
         + '    print(f"frame {seam.frame}: {seam.jolt_mm:.1f} mm; {seam.source_mm:.1f} mm before")\n'
@@ -205,27 +181,28 @@ def _edit(state: State) -> tuple[str, str]:
 
 def _compare(state: State) -> tuple[str, str]:
     """`settings` of the state are those of comparing.settings_of, which complete() has filled in."""
-    rebuilt = VARIATIONS[state["vary"]].of == MOTION
-    settings: list[Setting] = list(state.values["settings"])
-    if not rebuilt:
+    of, settings = VARIATIONS[state["vary"]].of, list(state.values["settings"])
+    if of == EDIT:
+        return _edits(state, settings)
+    if of == PROMPT:
         rows = "".join(
-            f"    {_literal(one.name)}: dict(system={_literal(one.system)}, seed={one.seed}, cfg={_number(one.cfg)}, "
-            f"temperature={_number(one.temperature)}, guidance={_number(one.guidance)}),\n"
+            f"    {literal(one.name)}: dict(system={literal(one.system)}, seed={one.seed}, cfg={number(one.cfg)}, "
+            f"temperature={number(one.temperature)}, guidance={number(one.guidance)}),\n"
             for one in settings
         )
-        made = f"engine.generate({_literal(settings[0].text)}, {_number(settings[0].seconds)}, **setting)"
+        made = f"engine.generate({literal(settings[0].text)}, {number(settings[0].seconds)}, **setting)"
         return "One prompt, several settings.", (
             "from playground.engine import default_engine\nfrom playground.motion.measures import foot_sliding\n\n"
             f"engine = default_engine()\nsettings = {{\n{rows}}}\nresults = {{}}\n"
             f"for name, setting in settings.items():\n    results[name] = {made}\n" + _SLIDES
         )
     rows = "".join(
-        f"    {_literal(one.name)}: ({_literal(one.text)}, {_literal(one.system)}, {_number(one.guidance)}, "
+        f"    {literal(one.name)}: ({literal(one.text)}, {literal(one.system)}, {number(one.guidance)}, "
         f"{one.scales}),\n"
         for one in settings
     )
     return "One motion, several settings.", (
-        _opened(state)
+        opened(state)
         + "from playground.motion.measures import foot_sliding\n\n"
         + f"settings = {{  # caption, system, guidance, scales\n{rows}}}\ntokens, results = {{}}, {{}}\n"
         + "for name, (caption, system, guidance, scales) in settings.items():\n"
@@ -236,16 +213,21 @@ def _compare(state: State) -> tuple[str, str]:
     )
 
 
-def _remade(state: State) -> str:
-    """The lines that open the engine and give `made`, the motion that a name of the address stands for."""
-    wish, changes = read_name(str(state["motion"]), str(state["caption"]))
-    own = {"prompt": wish.prompt or "", "free": wish.prompt is None, "seconds": wish.seconds, "g": wish.guidance,
-           "s": wish.cfg, "temperature": wish.temperature, "topk": wish.top_k, "topp": wish.top_p,
-           "system": (state.system,)}  # fmt: skip
-    return (
-        "from playground.engine import default_engine\n\nengine = default_engine()\n"
-        + _drawn(State("generate", own), wish.seed, 1)
-        + "".join(f"made = engine.regenerate({_changed(one)})\n" for one in changes)
+def _edits(state: State, settings: list[Setting]) -> tuple[str, str]:
+    """One edit, several settings."""
+    first = settings[0]
+    span = None if first.span is None else tuple(round(edge * LIMITS.fps) for edge in first.span)
+    rows = "".join(f"    {literal(one.name)}: dict(kind={literal(one.kind)}, seed={one.seed}),\n" for one in settings)
+    given = {"system": literal(first.system), "caption": literal(state["caption"])}
+    given |= {"guidance": number(first.guidance), "cfg": number(first.cfg)}
+    arguments = "".join(f", {name}={value}" for name, value in given.items())
+    return "One edit, several settings.", (
+        opened(state)
+        + "from playground.motion.measures import foot_sliding\n\n"
+        + f"settings = {{\n{rows}}}\nresults = {{}}\n"
+        + "for name, setting in settings.items():\n"
+        + f"    results[name] = engine.edit(motion, {span}, {literal(first.text)}, **setting{arguments})\n"
+        + _SLIDES
     )
 
 
@@ -258,41 +240,3 @@ SCRIPTS: dict[str, Callable[[State], tuple[str, str]]] = {
     "edit": _edit,
     "compare": _compare,
 }
-
-
-def _opened(state: State) -> str:
-    """The lines that open the engine and give `motion`."""
-    wanted = str(state["motion"])
-    start = float(state["start"]) if any(row.key == "start" for row in controls_of(state.room)) else 0.0
-    poses = LIMITS.max_frames + 1
-    if not wanted.startswith(OWN_FILE):
-        return (
-            "from playground.engine import default_engine\n\nengine = default_engine()\n"
-            f"(example,) = [one for one in engine.examples() if one.id == {_literal(wanted)}]\n"
-            f"motion = example.motion().slice(0, {poses})\n"
-        )
-    first = round(start * LIMITS.fps)
-    return (
-        "from pathlib import Path\n\nfrom playground.engine import default_engine\n"
-        "from playground.motion.formats import read_motion\n\nengine = default_engine()\n"
-        f"motion = read_motion(Path({_literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n"
-        f"motion = motion.slice({first}, {first + poses})\n"
-    )
-
-
-def _scales(scales: Scales) -> str:
-    return str(scales.n) if scales.kind == "upto" else _literal(f"{scales.kind}:{scales.n}")
-
-
-def _in_words(scales: Scales) -> str:
-    words = {"upto": "scales 1 to {}", "only": "scale {} alone", "without": "all but scale {}"}
-    return words[scales.kind].format(scales.n)
-
-
-def _literal(text: object) -> str:
-    """A text as a Python literal in double quotes: a JSON string is one."""
-    return json.dumps(str(text), ensure_ascii=False)
-
-
-def _number(value: float) -> str:
-    return repr(float(value)).removesuffix(".0")

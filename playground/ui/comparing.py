@@ -1,13 +1,15 @@
-"""What the room Compare does: one prompt or motion through two to six settings or systems, and how they differ.
+"""What the room Compare does: one prompt, motion or edit through two to six settings or systems, how they differ.
 
 A row of VARIATIONS is one thing that may differ; systems are a row like the others and appear as soon as a second one
-is shipped. `settings_of` gives the settings of a wish, `run` their results one after the other.
+is shipped. `settings_of` gives the settings of a wish, `run` their results one after the other. The motion may be one
+of the library, a stored clip of the maps or a generated one: `origin_of` finds it by its name in an address.
 """
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from playground.analysis.bundle import Bundle
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.measures import foot_sliding, mpjpe
@@ -15,12 +17,18 @@ from playground.motion.motion import Motion
 from playground.systems import row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens
+from playground.ui.drawing import MADE, made_again
 from playground.ui.facts import bits
 from playground.ui.services import Services
+from playground.ui.state import State
 from playground.ui.uploads import checked_number
 
-PROMPT, MOTION = "prompt", "motion"
+PROMPT, MOTION, EDIT = "prompt", "motion", "edit"
 WRONG = "a person lies down"
+EDIT_TITLES = {  # kind of edit -> its name
+    "inpaint": "In-painting", "outpaint": "Out-painting", "prefix": "Prefix", "suffix": "Suffix",
+    "inbetween": "In-between",
+}  # fmt: skip
 Choices = Callable[[Services], Sequence[tuple[str, str]]]
 
 
@@ -30,13 +38,23 @@ class Setting:
 
     name: str = ""
     system: str = ""
-    text: str = ""  # the prompt, or the motion's caption
+    text: str = ""  # the prompt, or the motion's caption; for an edit what should happen
     seconds: float = 0.0
     seed: int = 0
     cfg: float = 0.0
     temperature: float = 1.0
     guidance: float = 0.0
     scales: int | None = None  # None: all
+    kind: str = ""  # of an edit
+    span: tuple[float, float] | None = None  # of an edit, in seconds; None is that of the published benchmark
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The motion that goes through, and what it is called. Its caption is the motion's own."""
+
+    motion: Motion
+    title: str
 
 
 @dataclass(frozen=True)
@@ -44,7 +62,7 @@ class Variation:
     """One thing that may differ. choices: (what the screen says, what the address says); usual: chosen at first."""
 
     title: str
-    of: str  # PROMPT | MOTION
+    of: str  # PROMPT | MOTION | EDIT
     choices: Choices
     usual: tuple[str, ...]
     apply: Callable[[Setting, str], Setting]
@@ -53,7 +71,7 @@ class Variation:
     @property
     def most(self) -> int:
         """Settings at once; the original motion takes one figure."""
-        return LIMITS.max_figures - (self.of == MOTION)
+        return LIMITS.max_figures - (self.of != PROMPT)
 
 
 def _listed(*values: str) -> Choices:
@@ -67,8 +85,7 @@ def _scales(services: Services) -> list[tuple[str, str]]:
 
 def _systems(drawing: bool) -> Choices:
     def shipped(services: Services) -> list[tuple[str, str]]:
-        found = [one for one in services.engine().systems() if one.checkpoint == "shipped"]
-        return [(one.title, one.name) for one in found if one.generator or not drawing]
+        return [(one.title, one.name) for one in services.shipped("generator" if drawing else "tokenizer")]
 
     return shipped
 
@@ -76,6 +93,10 @@ def _systems(drawing: bool) -> Choices:
 def _with_its_sampling(setting: Setting, system: str) -> Setting:
     own = row_of(system).sampling
     return replace(setting, system=system, cfg=own.cfg, guidance=own.guidance, temperature=own.temperature)
+
+
+def _kinds(services: Services) -> list[tuple[str, str]]:
+    return [(title, kind) for kind, title in EDIT_TITLES.items()]
 
 
 _WORDS = {"own": "Its caption", "none": "No caption", "wrong": f"“{WRONG}”"}
@@ -104,12 +125,17 @@ VARIATIONS: dict[str, Variation] = {
         "Temperature", PROMPT, _listed("0", "0.5", "1", "1.5", "2"), ("0", "1", "2"),
         lambda s, v: replace(s, temperature=float(v)),
         "Temperature {}"),
+    "redraw": Variation(
+        "Seed", EDIT, _listed(*map(str, range(10))), ("0", "1", "2"),
+        lambda s, v: replace(s, seed=int(v)),
+        "Seed {}"),
+    "kind": Variation("Kind", EDIT, _kinds, ("inpaint", "outpaint", "prefix"), lambda s, v: replace(s, kind=v)),
 }  # fmt: skip
 
 
 def offered(services: Services) -> list[tuple[str, str]]:
     """(title, key) of the variations that have at least two choices here."""
-    of = {PROMPT: "from a prompt", MOTION: "of a motion"}
+    of = {PROMPT: "from a prompt", MOTION: "of a motion", EDIT: "of an edit"}
     return [(f"{v.title}, {of[v.of]}", key) for key, v in VARIATIONS.items() if len(v.choices(services)) > 1]
 
 
@@ -125,9 +151,11 @@ def chosen(services: Services, vary: str, wanted: Sequence[str]) -> list[tuple[s
 
 
 def settings_of(
-    services: Services, vary: str, values: Sequence[str], text: str, seconds: object = 4.0, seed: object = 0
-) -> list[Setting]:
-    """The settings side by side. text: the prompt, or the caption of the motion. PlaygroundError for a wrong number."""
+    services: Services, vary: str, values: Sequence[str], text: str, seconds: object = 4.0, seed: object = 0,
+    kind: str = "inpaint", span: tuple[float, float] | None = None,
+) -> list[Setting]:  # fmt: skip
+    """The settings side by side. text: the prompt, or the caption of the motion; kind and span (seconds): of an edit.
+    PlaygroundError for a wrong number."""
     if vary not in VARIATIONS:
         raise PlaygroundError(f"what differs is one of {', '.join(VARIATIONS)}")
     variation, system = VARIATIONS[vary], services.default_system()
@@ -135,12 +163,13 @@ def settings_of(
     picked = [value for value in values if value in known]
     if not 2 <= len(picked) <= variation.most:
         raise PlaygroundError(f"choose 2 to {variation.most} of them to see side by side; {len(picked)} are chosen")
-    words = normalise(text) if variation.of == PROMPT else text
+    words = text if variation.of == MOTION else normalise(text)
     long = checked_number(seconds, "the length in seconds", LIMITS.min_seconds, LIMITS.max_seconds)
     number = int(checked_number(seed, "the seed", 0, LIMITS.max_seed))
     own = system.sampling
     base = Setting("", system.name, words, long, number, own.cfg, own.temperature, own.guidance)
     base = replace(base, guidance=0.0) if variation.of == MOTION else base
+    base = replace(base, kind=kind, span=span) if variation.of == EDIT else base
     return [
         variation.apply(replace(base, name=variation.called.format(title)), name)
         for title, name in chosen(services, vary, picked)
@@ -149,7 +178,7 @@ def settings_of(
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """What one setting gave. error_mm: against the original, or where there is none against the first result."""
+    """What one setting gave. error_mm: MPJPE to the original, or where there is none to the first result."""
 
     setting: Setting
     motion: Motion
@@ -179,7 +208,10 @@ def run(services: Services, settings: Sequence[Setting], source: Motion | None) 
     for system in {setting.system for setting in settings}:
         services.palettes(system)  # loads its models, so that no setting is timed with them
     for setting in settings:
-        done.append(_generated(services, setting, done) if source is None else _rebuilt(services, setting, source))
+        if source is None:
+            done.append(_generated(services, setting, done))
+        else:
+            done.append((_edited if setting.kind else _rebuilt)(services, setting, source))
         yield list(done)
 
 
@@ -200,3 +232,62 @@ def _rebuilt(services: Services, setting: Setting, source: Motion) -> Compared:
     decoded = engine.reconstruct(tokenized, guidance=setting.guidance, scales=setting.scales)
     taken = tokenized.seconds + decoded.seconds
     return Compared(setting, decoded.motion, tokenized.levels[: setting.scales], decoded.mpjpe_mm, taken)
+
+
+def _edited(services: Services, setting: Setting, source: Motion) -> Compared:
+    began = time.perf_counter()
+    span = None if setting.span is None else [round(edge * LIMITS.fps) for edge in setting.span]
+    made = services.engine().edit(
+        source, span, setting.text, setting.seed, setting.kind, system=setting.system, caption=source.caption,
+        guidance=setting.guidance, cfg=setting.cfg,
+    )  # fmt: skip
+    error = mpjpe(made.source.joints, made.motion.joints)
+    return Compared(setting, made.motion, made.levels, error, time.perf_counter() - began)
+
+
+def span_of(state: State) -> tuple[float, float] | None:
+    """The span of an edit that an address holds, in seconds, or None."""
+    start, stop = state.values.get("from"), state.values.get("to")
+    return None if start is None or stop is None or stop <= start else (float(start), float(stop))
+
+
+def is_origin(services: Services, name: str) -> bool:
+    """Whether `origin_of` finds a motion by this name."""
+    return name.startswith(MADE) or name in {one.id for one in services.examples()} or is_clip(services, name)
+
+
+def is_clip(services: Services, name: str) -> bool:
+    """Whether it names a stored clip of the maps."""
+    return _clip(services, name) is not None
+
+
+def origin_caption(services: Services, name: str) -> str:
+    """The words of its own that a motion has; "" for a generated one, whose prompt is not in its name."""
+    bundle, row = _clip(services, name) or (None, 0)
+    if bundle is not None:
+        return bundle.clips[row].caption
+    return "" if name.startswith(MADE) else services.example(name).caption
+
+
+def origin_of(services: Services, name: str, caption: str | None = None) -> Origin:
+    """The motion that a name of an address stands for. caption: other words for it, the prompt of a generated one.
+    PlaygroundError where there is none."""
+    own = origin_caption(services, name) if caption is None else caption
+    if name.startswith(MADE):
+        made = made_again(services, name, own)
+        return Origin(replace(made.motion, caption=made.prompt), made.prompt or "a generated motion")
+    bundle, row = _clip(services, name) or (None, 0)
+    if bundle is None:
+        found = services.example(name)
+        return Origin(replace(found.motion(), caption=own), found.title)
+    motion = services.engine().decode(bundle.token_file(row)).motion
+    return Origin(replace(motion, caption=own), bundle.clips[row].caption or bundle.clips[row].action)
+
+
+def _clip(services: Services, name: str) -> tuple[Bundle, int] | None:
+    """A stored clip of the maps: where it lies, None where there is none of that name."""
+    try:
+        bundle = services.bundle(services.default_system().name)
+    except PlaygroundError:
+        return None
+    return (bundle, bundle.position(name)) if name in bundle.ids else None

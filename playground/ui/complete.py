@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from playground.systems import row_of
-from playground.ui.comparing import MOTION, VARIATIONS, chosen, settings_of
+from playground.ui.comparing import MOTION, VARIATIONS, chosen, is_clip, is_origin, origin_caption, settings_of, span_of
 from playground.ui.drawing import MADE
 from playground.ui.rooms.embedding import first_clip
 from playground.ui.services import Services
@@ -25,10 +25,11 @@ def _with_settings(services: Services, state: State) -> State:
     """What is compared, one by one, as `settings`: the address names only what differs."""
     vary = str(state["vary"])
     picked = [name for _, name in chosen(services, vary, str(state.values.get("values") or "").split("_"))]
-    of_motion = VARIATIONS[vary].of == MOTION
-    text = services.example(str(state["motion"])).caption if of_motion else str(state["prompt"])
-    picked = picked[: VARIATIONS[vary].most]
-    return state.with_values(settings=settings_of(services, vary, picked, text, state["seconds"], state["seed"]))
+    text = str(state["caption"] if VARIATIONS[vary].of == MOTION else state["prompt"])
+    picked, numbers = picked[: VARIATIONS[vary].most], (state["seconds"], state["seed"])
+    edit = (str(state["kind"]), span_of(state))
+    settings = settings_of(services, vary, picked, text, *numbers, *edit)
+    return state.with_values(settings=settings, clip=is_clip(services, str(state["motion"])))
 
 
 def _is_there(services: Services, state: State) -> bool:
@@ -36,6 +37,8 @@ def _is_there(services: Services, state: State) -> bool:
     wanted = str(state.values["motion"])
     if state.room == "embedding-map":
         return wanted in services.bundle(str(state.system)).ids
+    if state.room == "compare":
+        return is_origin(services, wanted)
     return wanted.startswith((OWN_FILE, MADE)) or any(example.id == wanted for example in services.examples())
 
 
@@ -57,6 +60,8 @@ def _motion(services: Services, state: State) -> str:
 def _caption(services: Services, state: State) -> str:
     """The motion's own caption; a file's is not known here."""
     wanted = str(state["motion"])
+    if state.room == "compare":
+        return origin_caption(services, wanted)
     return "" if wanted.startswith((OWN_FILE, MADE)) else services.example(wanted).caption
 
 

@@ -10,6 +10,7 @@ from playground.figures.stage import Json
 from playground.limits import LIMITS
 from playground.motion.motion import Motion
 from playground.results import Generation, Tokenized
+from playground.ui.comparing import EDIT_TITLES
 from playground.ui.drawing import MADE, made_again
 from playground.ui.facts import Fact, significant, table
 from playground.ui.scenes import score
@@ -23,13 +24,14 @@ if TYPE_CHECKING:
 
 NAME = "edit"
 BEFORE, AFTER = "before", "after"
-KINDS = {  # kind -> (its name, what it does, in one line)
-    "inpaint": ("In-painting", "The span is drawn anew between what comes before and after."),
-    "outpaint": ("Out-painting", "The span stays; everything around it is drawn anew."),
-    "prefix": ("Prefix", "What comes before the span stays; the rest is drawn as its continuation."),
-    "suffix": ("Suffix", "What comes after the span stays; the way there is drawn."),
-    "inbetween": ("In-between", "As in-painting, and no token that reaches into the span is kept."),
+_DOES = {
+    "inpaint": "The span is drawn anew between what comes before and after.",
+    "outpaint": "The span stays; everything around it is drawn anew.",
+    "prefix": "What comes before the span stays; the rest is drawn as its continuation.",
+    "suffix": "What comes after the span stays; the way there is drawn.",
+    "inbetween": "As in-painting, and no token that reaches into the span is kept.",
 }
+KINDS = {kind: (title, _DOES[kind]) for kind, title in EDIT_TITLES.items()}  # kind -> (name, what it does, in a line)
 SEAM_CARD = (
     "The harder one of the seams: how much a joint is pushed where kept and drawn frames meet, the mean over joints of "
     "|x[f+1] - 2 x[f] + x[f-1]|. A motion has such pushes of its own; the table says how large they were there before."

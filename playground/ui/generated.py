@@ -92,9 +92,6 @@ def onward(result: Result, take: int) -> str:
     links, name = [], made_name(wish, seed, result.changes)
     if name:
         links.append(("Edit this motion", State("edit", {"motion": name, "caption": wish.prompt or ""})))
-    if wish.prompt:
-        asked = {"prompt": wish.prompt, "seconds": wish.seconds, "seed": made.seed}
-        links.append(("Compare settings", State("compare", {"vary": "s", **asked})))
     parts = [f'<a data-state href="{html.escape(query(state), quote=True)}">{text}</a>' for text, state in links]
     return f'<p class="mtp-aside mtp-onward">{" · ".join(parts)}</p>'
 

@@ -30,11 +30,16 @@ def stage_and_score(name: str, opening: View, height: int = FIGURES_HEIGHT) -> g
 
 
 @contextmanager
-def panel(title: str, lead: str) -> Iterator[gr.Column]:
-    """The panel of a room, opened by what the room shows in one line and how to read it in one more."""
+def panel(title: str, lead: str, compare: bool = False, back: bool = False) -> Iterator[gr.Column]:
+    """The panel of a room, opened by what the room shows in one line and how to read it in one more.
+
+    compare: with the switch that takes what the room shows to Compare; back: with the way back from there (bar.js).
+    """
+    switch = '<button type="button" class="mtp-switch" data-part="compare">Compare</button>' if compare else ""
+    switch += '<button type="button" class="mtp-switch" data-part="back" hidden>Back</button>' if back else ""
     with gr.Column(elem_classes=["mtp-panel"], min_width=0) as box:
         gr.HTML(
-            f'<div class="mtp-lead"><h2>{html.escape(title)}</h2><p>{html.escape(lead)}</p></div>',
+            f'<div class="mtp-lead"><div><h2>{html.escape(title)}</h2>{switch}</div><p>{html.escape(lead)}</p></div>',
             apply_default_css=False,
         )
         yield box

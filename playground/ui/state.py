@@ -23,7 +23,7 @@ from playground.ui.places import Span as Span
 from playground.ui.places import Token as Token
 
 ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "compare", "learn")
-PARTS = {name: f'[data-part="{name}"]' for name in ("link", "python", "export", "tour")} | {
+PARTS = {name: f'[data-part="{name}"]' for name in ("link", "python", "export", "tour", "compare")} | {
     "learn": "#room-learn-button"
 }  # parts of the page, beside controls, that `hide` may name -> how the page finds them
 UPLOADED = "uploaded"  # what a menu of motions calls the visitor's own file
@@ -55,7 +55,9 @@ def _of_stage(room: str, prefix: str) -> tuple[Control, ...]:
 
 
 EDITS = ("inpaint", "outpaint", "prefix", "suffix", "inbetween")
-DIFFERENCES = ("system", "scales", "caption", "g", "maker", "seed", "s", "temperature")  # what Compare may vary
+DIFFERENCES = (  # what Compare may vary
+    "system", "scales", "caption", "g", "maker", "seed", "s", "temperature", "redraw", "kind",
+)  # fmt: skip
 _WAVES = "a person is waving with both hands"
 _PROMPT, _SEED, _G = LIMITS.max_prompt_chars, LIMITS.max_seed, LIMITS.max_guidance
 CONTROLS: tuple[Control, ...] = (
@@ -122,6 +124,10 @@ CONTROLS: tuple[Control, ...] = (
     Control("prompt", "compare", "text", _WAVES, "Prompt", 1, _PROMPT, element="compare-prompt"),
     Control("seconds", "compare", "number", 4.0, "Seconds", 1, LIMITS.max_seconds, element="compare-seconds"),
     Control("seed", "compare", "whole", 0, "Seed", 0, _SEED, element="compare-seed"),
+    Control("caption", "compare", "text", None, "Caption of the motion", 0, _PROMPT),
+    Control("kind", "compare", "choice", "inpaint", "Kind of edit", choices=EDITS),
+    Control("from", "compare", "number", None, "Edited from, s", 0, LIMITS.max_seconds),
+    Control("to", "compare", "number", None, "Edited to, s", 0, LIMITS.max_seconds),
     Control("take", "compare", "whole", 0, "Tokens of", 0, LIMITS.max_figures - 1, element="compare-take"),
     Control("hide", "", "names", (), "Hidden controls"),
 )  # fmt: skip

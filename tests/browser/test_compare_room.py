@@ -70,3 +70,49 @@ def test_a_phone_never_scrolls_sideways(visit: Go, stand_in: str) -> None:
     page = visit(f"{stand_in}?room=compare", viewport=PHONE, has_touch=True, is_mobile=True).page
     page.wait_for_function(SHOWN, arg=4)
     assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_a_comparison_can_be_stopped(seen: Visit) -> None:
+    page = seen.page
+    page.locator("#compare-vary input").click()
+    page.get_by_role("option", name="Seed, from a prompt").click()
+    expect(page.locator("#compare-prompt")).to_be_visible()
+    page.locator("#compare-go").click()
+    expect(page.locator("#compare-stop")).to_be_enabled()
+    page.wait_for_function(SHOWN, arg=1)
+    page.locator("#compare-stop").click()
+    expect(page.locator("#compare-message")).to_contain_text(re.compile(r"Stopped after \d of 4"))
+    expect(page.locator("#compare-go")).to_be_enabled()
+    expect(page.locator("#compare-stop")).to_be_disabled()
+
+
+ROOMS = ["Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit"]
+
+
+def test_every_room_leads_to_compare_and_back(visit: Go, stand_in: str) -> None:
+    seen = visit(stand_in)
+    page = seen.page
+    for room in ROOMS:
+        seen.enter(room)
+        own = page.locator(f"#room-{room.lower().replace(' ', '-')}")
+        switch = own.get_by_role("button", name="Compare", exact=True).first
+        expect(switch).to_be_visible()
+        switch.click()
+        expect(page.get_by_role("tab", name="Compare", exact=True)).to_have_attribute("aria-selected", "true")
+        expect(page).to_have_url(re.compile("room=compare"))
+        page.get_by_role("button", name=f"Back to {room}").click()
+        expect(page.get_by_role("tab", name=room, exact=True)).to_have_attribute("aria-selected", "true")
+        expect(switch).to_be_visible()
+    assert seen.complaints == []
+
+
+def test_compare_begins_where_guidance_stands(visit: Go, stand_in: str) -> None:
+    page = visit(f"{stand_in}?room=guidance&motion=m2&g=6").page
+    page.wait_for_function("() => window.MotionStage?.get('guidance')?.state.guidance === 6")
+    page.locator("#room-guidance").get_by_role("button", name="Compare", exact=True).click()
+    page.wait_for_function(SHOWN, arg=5)
+    expect(page.locator("#compare-stage .ms-labels")).to_contain_text("g = 6")
+    expect(chip(page, "6").locator("input")).to_be_checked()
+    expect(page).to_have_url(re.compile("motion=m2"))
+    page.go_back()
+    expect(page.get_by_role("tab", name="Guidance", exact=True)).to_have_attribute("aria-selected", "true")

@@ -19,6 +19,7 @@ from playground.ui.state import State
 from tests.conftest import drifting
 from tests.ui.test_code import NO_SCRIPT, ids, run
 
+CLIP = "{the fourth clip of the maps}"
 Left = dict[str, Any]
 Check = Callable[[Services, State, Left], None]
 
@@ -108,6 +109,21 @@ def compare(services: Services, state: State, left: Left) -> None:
         assert ids(left["tokens"][one.setting.name].levels) == ids(one.levels)
 
 
+def compare_edits(services: Services, state: State, left: Left) -> None:
+    motion = services.example_motion("synthetic-kick")
+    for name, kind in (("In-painting", "inpaint"), ("Suffix", "suffix")):
+        edited = default_engine().edit(motion, (10, 30), "a person bows", 4, kind, caption="a kick")
+        assert ids(left["results"][name].levels) == ids(edited.levels)
+
+
+def compare_a_clip(services: Services, state: State, left: Left) -> None:
+    bundle = services.bundle("lgtok-lite")
+    motion = default_engine().decode(bundle.token_file(3)).motion
+    tokens = default_engine().tokenize(motion, bundle.clips[3].caption)
+    assert ids(left["tokens"]["Scales 1 to 2"].levels) == ids(tokens.levels)
+    assert left["results"]["Scales 1 to 4"].mpjpe_mm == default_engine().reconstruct(tokens, scales=4).mpjpe_mm
+
+
 ADDRESSES: list[tuple[str, str, Check]] = [
     ("tokenize", "motion=synthetic-kick&scales=only-3&selection=lgtok-lite.2.1&code=9&wrong=a+person+sits", tokenize),
     ("embedding-map", "each=token&place=synthetic-bow", map_of_an_example),
@@ -118,6 +134,9 @@ ADDRESSES: list[tuple[str, str, Check]] = [
     ("guidance", "motion=synthetic-run&caption=someone+hurries&g=3.5", guidance),
     ("edit", "motion=synthetic-kick&kind=suffix&from=0&to=1.5&prompt=a+person+bows&seed=2&measured=1", edit),
     ("compare", "vary=g&values=0_4&motion=synthetic-kick", compare),
+    ("compare", "vary=kind&values=inpaint_suffix&motion=synthetic-kick&caption=a+kick&prompt=a+person+bows&seed=4"
+     "&from=0.5&to=1.5", compare_edits),
+    ("compare", f"vary=scales&values=2_4&motion={CLIP}", compare_a_clip),
 ]  # fmt: skip
 
 
@@ -129,6 +148,7 @@ def test_every_room_is_checked() -> None:
 def test_the_script_gives_what_the_room_shows(
     services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: str, query: str, check: Check
 ) -> None:
+    query = query.replace(CLIP, services.bundle("lgtok-lite").ids[3])
     np.savez(tmp_path / "my walk.npz", joints=drifting(400), fps=20.0)
     state, left = run(services, f"?room={room}&{query}", tmp_path, monkeypatch)
     check(services, state, left)

@@ -12,7 +12,7 @@ from playground.limits import LIMITS
 from playground.motion.measures import mpjpe
 from playground.systems import SystemInfo
 from playground.ui.compared import COLUMNS, ERROR, best_of, compared_view
-from playground.ui.comparing import MOTION, PROMPT, VARIATIONS, Compared, chosen, offered, run, settings_of
+from playground.ui.comparing import PROMPT, VARIATIONS, Compared, chosen, offered, run, settings_of
 from playground.ui.rooms.compare import Handlers, Held, compare, opening_view
 from playground.ui.services import Services
 from playground.ui.state import DIFFERENCES, parse
@@ -58,10 +58,10 @@ def test_systems_are_offered_as_soon_as_there_are_two(services: Services) -> Non
 def test_every_variation_changes_one_thing(services: Services, vary: str) -> None:
     settings = settings_of(services, vary, names(services, vary), "a person sits", 2.0, 3)
     assert 2 <= len(settings) <= VARIATIONS[vary].most and len({one.name for one in settings}) == len(settings)
-    field = {"s": "cfg", "g": "guidance", "caption": "text"}.get(vary, vary)
+    field = {"s": "cfg", "g": "guidance", "caption": "text", "redraw": "seed"}.get(vary, vary)
     assert len({getattr(one, field) for one in settings}) == len(settings)
     assert len({replace(one, name="", **{field: getattr(settings[0], field)}) for one in settings}) == 1
-    source = motions()[0] if VARIATIONS[vary].of == MOTION else None
+    source = None if VARIATIONS[vary].of == PROMPT else motions()[0]
     *_, done = run(services, settings, source)
     figures = compared_view(services, done, source, "x", 1).stage["figures"]
     assert len(figures) == len(settings) + (source is not None) <= LIMITS.max_figures

@@ -197,7 +197,7 @@ def room(services: Services) -> None:
                          height=LINES, elem_id="codebooks-summary", narrowest=720)  # fmt: skip
             with gr.Accordion("All numbers, scale by scale", open=False, elem_classes=["mtp-fold"]):
                 numbers = gr.HTML(opening.controls.get("table", ""), elem_id="codebooks-table", apply_default_css=False)
-        with panel("Which codes are used", LEAD):
+        with panel("Which codes are used", LEAD, compare=True):
             system, order, k = _controls(services, opening)
             message = message_place("codebooks-message")
             known = gr.HTML(error_line(trouble) if trouble else facts_line(opening.facts), elem_id="codebooks-facts",

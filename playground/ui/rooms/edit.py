@@ -146,7 +146,7 @@ def room(services: Services) -> None:
     session = gr.State(EditSession(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
-        with panel("Change a part of a motion", LEAD):
+        with panel("Change a part of a motion", LEAD, compare=True):
             example, upload, last = _sources(services, opening)
             wishes = _controls(services, opening)
             message = message_place("edit-message")

@@ -225,7 +225,7 @@ def room(services: Services) -> None:
     session = gr.State(Session(), time_to_live=LIMITS.session_seconds)
     with room_frame(STAGE):
         stage = stage_and_score(STAGE, opening)
-        with panel("A map of motions", LEAD):
+        with panel("A map of motions", LEAD, compare=True):
             views = panel_views(services, map_systems(services), opening, NEAR)
         words(NAME)
         door = link_door(NAME)

@@ -196,7 +196,7 @@ def room(services: Services) -> None:
     visit = gr.State(Visit(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
-        with panel("Words become a motion", LEAD):
+        with panel("Words become a motion", LEAD, compare=True):
             card = inspector(elem_id="generate-token")
             with gr.Column(elem_classes=["mtp-form"], min_width=0):
                 prompt, seconds, seed, takes, buttons = _controls(opening)

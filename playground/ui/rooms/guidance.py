@@ -112,7 +112,7 @@ def room(services: Services) -> None:
     opening = services.first_view(NAME, opening_view)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
-        with panel("What g does", LEAD):
+        with panel("What g does", LEAD, compare=True):
             g = gr.Slider(0, LIMITS.max_guidance, FIRST, step=0.05, label="Guidance g", elem_id="guidance-g")
             gr.HTML(FORMULA, apply_default_css=False)
             curve, told = sweep(services)

@@ -107,7 +107,7 @@ class Handlers:
             found = known.get(wanted) or self.services.opening_example()
             session = Session(found.id, Source(found.motion(), found.title), 0.0, found.caption, upload=upload)
         session.caption = state.values.get("caption", session.caption)
-        shipped = {system.name for system in self.services.shipped()}
+        shipped = {system.name for system in self.services.shipped("tokenizer")}
         session.system = state.system if state.system in shipped else ""
         session.wish = state["code"] if isinstance(state["selection"], Token) else None
         shown = [*self._show(session, note, state), gr.skip()]
@@ -147,7 +147,7 @@ def room(services: Services) -> None:
     session = gr.State(Session(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
-        with panel("A motion becomes tokens, and comes back", LEAD):
+        with panel("A motion becomes tokens, and comes back", LEAD, compare=True):
             with gr.Column(elem_classes=["mtp-view", "mtp-view-motion"], min_width=0):
                 example, system, upload, caption, go, ask, start, kind, scales = _controls(services, opening)
             message = message_place("tokenize-message")
@@ -189,7 +189,7 @@ def room(services: Services) -> None:
 
 def _controls(services: Services, opening: View) -> tuple[Any, ...]:
     """The controls from top to bottom: motion, system, upload, caption, its buttons, window, scales."""
-    shipped = services.shipped()
+    shipped = services.shipped("tokenizer")
     usual = services.default_system().name if shipped else None
     with gr.Row(elem_classes=["mtp-line"]):
         example = gr.Dropdown(
