@@ -1,4 +1,4 @@
-"""python -m playground COMMAND: the arguments. What a command does is in commands.py.
+"""python -m playground COMMAND: the arguments. What a command does is in commands.py and inputs.py.
 
 Bad input and bad usage end with exit status 2 and one line on stderr. Heavy packages are imported by the command that
 needs them, so that a mistyped call is answered at once.
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from playground import commands
+from playground import commands, inputs
 from playground.data.library import SPLITS
 from playground.errors import PlaygroundError
 
@@ -157,20 +157,26 @@ def _for_models(command: Command) -> None:
     sub.add_argument("--out", type=_output(*MOTION_FILES), required=True, metavar="FILE", help=".npz, .bvh or .glb")
     sub.add_argument("--json", dest="to", type=_output(), metavar="TOKENS.json", help="also write the tokens")
 
-    sub = command("rewrite", commands.rewrite, "a prompt before it is used: normalised, in timed steps, in many words")
+    sub = command("rewrite", inputs.rewrite, "a prompt before it is used: normalised, in timed steps, in many words")
     sub.add_argument("prompt", metavar="PROMPT", type=_text)
     sub.add_argument("--rules", action="store_true", help="do not ask the language model of PLAYGROUND_LLM_URL")
     sub.add_argument("--json", dest="as_json", action="store_true", help="as JSON")
 
 
 def _for_data(command: Command) -> None:
-    """prepare, train, evaluate, bench."""
-    sub = command("prepare", commands.prepare, "published motion data to a library")
+    """prepare, segment, convert, train, evaluate, bench."""
+    sub = command("prepare", inputs.prepare, "published motion data to a library")
     sub.add_argument("source", metavar="SOURCE", help=SOURCES)
     sub.add_argument("root", metavar="ROOT", nargs="?", type=Path, help="the folder of the data; none for deepmimic")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="the library to write")
+    sub.add_argument("--cut", action="store_true", help="bvh: cut takes longer than 12 s at still moments")
 
-    sub = command("convert", commands.convert, "the files that other authors release to checkpoints")
+    sub = command("segment", inputs.segment, "where a long take is cut, with its speed curve")
+    sub.add_argument("take", metavar="TAKE", type=Path, help="a .bvh, .npy or .npz file")
+    sub.add_argument("--seed", type=int, default=0, help="of the draw (prepare uses 0)")
+    sub.add_argument("--html", type=_output(".html"), metavar="OUT.html", help="the curve with its cuts as a page")
+
+    sub = command("convert", inputs.convert, "the files that other authors release to checkpoints")
     sub.add_argument("family", metavar="FAMILY", choices=("lgtok",), help="lgtok: the authors' release of LG-Tok")
     sub.add_argument("--tokenizer", type=Path, required=True, metavar="FILE", help="weights of the tokenizer (.tar)")
     sub.add_argument("--generator", type=Path, required=True, metavar="FILE", help="weights of the generator (.tar)")

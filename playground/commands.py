@@ -118,48 +118,6 @@ def generate(
         _write_text(made.token_file().to_json(), to)
 
 
-def rewrite(prompt: str, rules: bool, as_json: bool) -> None:
-    """A prompt as a caption, as timed steps and in many words."""
-    from playground.text import endpoint, rewriting
-
-    made = rewriting.rewrite(prompt, None if rules else endpoint.from_environment())
-    if as_json:
-        say(_json(made.record()))
-        return
-    say(made.normalised)
-    for step in made.steps:
-        say(f"  {step.seconds:4.1f} s  {step.text}")
-    say(made.expressive)
-    for note in made.notes:
-        say(f"  - {note}")
-
-
-def prepare(source: str, root: Path | None, out: Path) -> None:
-    """Published data to library."""
-    from playground.data import sources
-
-    with Progress(f"preparing {source}") as progress:
-        prepared = sources.prepare(source, root, out, progress)
-    for note in prepared.notes:
-        say(note)
-    say(f"{out}: {prepared.clips} clips")
-
-
-def convert(
-    family: str, tokenizer: Path, generator: Path, options: Path, out: Path, statistics: Path | None,
-    llama: str | None, clip: str | None,
-) -> None:  # fmt: skip
-    """The released files of other authors to checkpoints; `family` is lgtok, the one there is."""
-    from playground.convert import convert_lgtok
-
-    with Progress(f"converting {family}"):
-        done = convert_lgtok(tokenizer, generator, options, out, statistics=statistics, llama=llama, clip=clip)
-    for note in done.notes:
-        say(note)
-    for path in done.files:
-        say(str(path))
-
-
 def train(
     config: str,
     library: Path,

@@ -23,7 +23,7 @@ FLOORS = (
     {"architectures", "checkpoints", "systems", "results", "findings", "stored", "runtime", "probes", "engine", "launch"},
     {"training", "evaluation", "analysis", "convert", "bench"},
     {"figures"},
-    {"ui", "cli", "commands", "__main__"},
+    {"ui", "cli", "commands", "inputs", "__main__"},
 )
 HEAVY = {  # package -> where it may be imported
     "gradio": ("playground/ui/", "app.py"),

@@ -111,3 +111,32 @@ def test_a_folder_without_bvh_files_says_so(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     with pytest.raises(PlaygroundError, match=r"no \.bvh file"):
         prepare("bvh", tmp_path / "in", tmp_path / "out")
+
+
+def test_long_takes_are_cut_on_demand(tmp_path: Path) -> None:
+    root = tmp_path / "in"
+    root.mkdir()
+    frames = 30 * 20
+    time = np.arange(frames) / 20
+    still = np.exp(-0.5 * ((time - 9.0) / 0.4) ** 2) + np.exp(-0.5 * ((time - 19.0) / 0.4) ** 2)
+    way = np.cumsum(np.maximum(1.0 - still, 0.0)) / 20
+    joints = drifting(frames, seed=1) * [1, 1, 0] + np.stack([0 * way, 0 * way, way], -1)[:, None]
+    write_motion(Motion(joints), root / "long_walk.bvh")
+    write_motion(Motion(drifting(60)), root / "short.bvh")
+    (root / "captions.csv").write_text("file,caption,start,end\nlong_walk.bvh,walks and stops,,\nshort.bvh,walks,,\n")
+    prepare("bvh", root, tmp_path / "whole")
+    assert [clip.frames for clip in Library.open(tmp_path / "whole").clips] == [frames, 60]
+    prepare("bvh", root, tmp_path / "cut", cut=True)
+    library = Library.open(tmp_path / "cut")
+    assert [clip.frames for clip in library.clips] == pytest.approx([180, 200, 220, 60], abs=4)
+    assert sum(clip.frames for clip in library.clips) == frames + 60
+    assert len({clip.id for clip in library.clips}) == 4 and library.clips[0].id.startswith("long_walk_0_")
+    assert {clip.captions for clip in library.clips[:3]} == {("walks and stops",)}
+    assert len({clip.split for clip in library.clips[:3]}) == 1
+
+
+@pytest.mark.parametrize("source", ["joints-npz", "deepmimic"])
+def test_only_takes_can_be_cut(source: str, tmp_path: Path) -> None:
+    root = None if source == "deepmimic" else tmp_path
+    with pytest.raises(PlaygroundError, match="cut already; long takes of bvh"):
+        prepare(source, root, tmp_path / "out", cut=True)

@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from playground.data.library import LibraryClip, write_library
@@ -23,7 +24,12 @@ SOURCES: dict[str, SourceEntry] = {
     "motion-x": SourceEntry(read_motion_x, True, "Motion-X as published, body only"),
     "snapmogen": SourceEntry(read_snapmogen, True, "SnapMoGen as its authors publish it, unpacked"),
     "cmp": SourceEntry(read_cmp, True, "CMP (Combat Motion Processed) as its authors publish it"),
-    "bvh": SourceEntry(read_bvh_folder, True, "a folder of .bvh files, with captions.csv if you have captions"),
+    "bvh": SourceEntry(
+        read_bvh_folder,
+        True,
+        "a folder of .bvh files, with captions.csv if you have captions",
+        partial(read_bvh_folder, cut_long=True),
+    ),
     "deepmimic": SourceEntry(read_deepmimic, False, "the motions that an installed pybullet package carries"),
 }
 
@@ -36,10 +42,11 @@ class Prepared:
     notes: tuple[str, ...]
 
 
-def open_source(source: str, root: Path | None) -> Reading:
+def open_source(source: str, root: Path | None, cut: bool = False) -> Reading:
     """Check a source and its folder; the clips are read while `Reading.clips` is consumed.
 
-    PlaygroundError for an unknown source, a folder that is missing, not expected or not what the source needs.
+    cut: long takes are cut at still moments (data/segment.py). PlaygroundError where the source has none, and for an
+    unknown source, a folder that is missing, not expected or not what the source needs.
     """
     if source not in SOURCES:
         raise PlaygroundError(f"unknown source {source!r}; one of {', '.join(SOURCES)} is accepted")
@@ -50,10 +57,21 @@ def open_source(source: str, root: Path | None) -> Reading:
         raise PlaygroundError(f"the source {source} takes no folder: it reads {entry.what}")
     if root is not None and not root.is_dir():
         raise PlaygroundError(f"{root} is not a folder; the source {source} needs {entry.what}")
-    return entry.read(root)
+    if not cut:
+        return entry.read(root)
+    if entry.read_cut is None or root is None:
+        takes = ", ".join(name for name, other in SOURCES.items() if other.read_cut)
+        raise PlaygroundError(f"the clips of {source} are cut already; long takes of {takes} can be cut")
+    return entry.read_cut(root)
 
 
-def prepare(source: str, root: Path | None, out: Path, progress: Callable[[int, int], None] | None = None) -> Prepared:
+def prepare(
+    source: str,
+    root: Path | None,
+    out: Path,
+    progress: Callable[[int, int], None] | None = None,
+    cut: bool = False,
+) -> Prepared:
     """Read a source and write it as a library to the folder `out`, which appears only when all of it is written.
 
     progress: called with (clips done, clips expected). PlaygroundError as in `open_source`, for a broken file, for a
@@ -61,7 +79,7 @@ def prepare(source: str, root: Path | None, out: Path, progress: Callable[[int, 
     """
     if out.exists() and not (out.is_dir() and ((out / "library.json").is_file() or not any(out.iterdir()))):
         raise PlaygroundError(f"{out} exists and is not a motion library; name a new or empty folder")
-    reading = open_source(source, root)
+    reading = open_source(source, root, cut)
     report = (lambda done: progress(min(done, reading.total), reading.total)) if progress else None
     partial = out.with_name(out.name + ".partial")
     shutil.rmtree(partial, ignore_errors=True)

@@ -38,6 +38,7 @@ class SourceEntry:
     read: Callable[[Path | None], Reading]
     needs_root: bool  # whether the reader is given a folder
     what: str  # what it reads, in words
+    read_cut: Callable[[Path], Reading] | None = None  # the same with long takes cut at still moments
 
 
 def folder(root: Path | None) -> Path:

@@ -2,7 +2,8 @@
 
 captions.csv has a header and the columns `file` (path below the folder), `caption`, and, if wanted, `start` and `end`
 (seconds), `split` and `action`. Rows of one file and span are captions of one clip. A file that no row names, and every
-file where there is no table, is read whole and captioned with the words of its file name.
+file where there is no table, is read whole and captioned with the words of its file name. On demand, what is longer
+than 12 s is cut at still moments (data/segment.py); the parts keep its captions.
 """
 
 import csv
@@ -13,8 +14,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from playground.data.actions import words_of
 from playground.data.library import SPLITS, LibraryClip
+from playground.data.segment import LONGEST, segment
 from playground.data.sources.base import Reading, folder, library_clip, read_text, split_of
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
@@ -35,8 +40,11 @@ class Cut:
     captions: tuple[str, ...]
 
 
-def read_bvh_folder(root: Path | None) -> Reading:
-    """PlaygroundError where there is no .bvh file or the table of captions does not fit the folder."""
+def read_bvh_folder(root: Path | None, cut_long: bool = False) -> Reading:
+    """PlaygroundError where there is no .bvh file or the table of captions does not fit the folder.
+
+    cut_long: takes longer than 12 s become several clips, their spans in their ids.
+    """
     root = folder(root)
     files = sorted(path for path in root.rglob("*") if path.suffix.lower() == ".bvh" and path.is_file())
     if not files:
@@ -45,7 +53,7 @@ def read_bvh_folder(root: Path | None) -> Reading:
     cuts = _read_table(root / TABLE, set(takes)) if (root / TABLE).is_file() else {}
     plan = [(take, cut) for take in takes for cut in cuts.get(take) or [_whole(take)]]
     left_out: Counter[str] = Counter()
-    return Reading(len(plan), _clips(takes, plan, left_out), left_out)
+    return Reading(len(plan), _clips(takes, plan, left_out, cut_long), left_out)
 
 
 def _whole(take: str) -> Cut:
@@ -53,7 +61,9 @@ def _whole(take: str) -> Cut:
     return Cut(0.0, None, split_of(take), words, (words,) if words else ())
 
 
-def _clips(takes: dict[str, Path], plan: list[tuple[str, Cut]], left_out: Counter[str]) -> Iterator[LibraryClip]:
+def _clips(
+    takes: dict[str, Path], plan: list[tuple[str, Cut]], left_out: Counter[str], cut_long: bool
+) -> Iterator[LibraryClip]:
     joints, current = None, None
     for take, cut in plan:
         if joints is None or take != current:
@@ -66,18 +76,30 @@ def _clips(takes: dict[str, Path], plan: list[tuple[str, Cut]], left_out: Counte
         if max(start, (stop or 0) - 1) > len(joints):
             wanted = f"from {cut.start:g} s" if stop is None else f"up to {cut.end:g} s"
             raise PlaygroundError(f"{TABLE} wants {take} {wanted}, but it ends at {len(joints) / LIMITS.fps:g} s")
-        name = Path(take).with_suffix("").as_posix()
-        clip = library_clip(
-            joints[start:stop],
-            left_out,
-            id=name if cut.end is None and not cut.start else f"{name}_{cut.start:g}_{cut.end or 'end'}",
-            source="BVH",
-            split=cut.split,
-            label=cut.action or " ".join(cut.captions[:1]),
-            captions=cut.captions,
-        )
-        if clip:
-            yield clip
+        for name, part in _parts(take, cut, joints[start:stop], cut_long):
+            clip = library_clip(
+                part,
+                left_out,
+                id=name,
+                source="BVH",
+                split=cut.split,
+                label=cut.action or " ".join(cut.captions[:1]),
+                captions=cut.captions,
+            )
+            if clip:
+                yield clip
+
+
+def _parts(
+    take: str, cut: Cut, joints: NDArray[np.float32], cut_long: bool
+) -> Iterator[tuple[str, NDArray[np.float32]]]:
+    """The clips that one wanted span gives, with their ids: itself, or its parts where it is cut."""
+    name = Path(take).with_suffix("").as_posix()
+    if cut_long and len(joints) > LONGEST * LIMITS.fps:
+        for start, stop in segment(joints, LIMITS.fps).spans:
+            yield f"{name}_{cut.start + start / LIMITS.fps:g}_{cut.start + stop / LIMITS.fps:g}", joints[start:stop]
+    else:
+        yield name if cut.end is None and not cut.start else f"{name}_{cut.start:g}_{cut.end or 'end'}", joints
 
 
 def _read_table(path: Path, takes: set[str]) -> dict[str, list[Cut]]:
