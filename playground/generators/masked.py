@@ -22,10 +22,10 @@ from playground.generators.masking import (
     choose,
     corrupt,
     draw_hidden,
-    init,
     null_text,
     prediction_loss,
     redraw_rows,
+    small_init,
     text_branches,
 )
 from playground.limits import LIMITS
@@ -54,7 +54,9 @@ class MaskedConfig(TrunkConfig):
 
 MASKED_PRESETS: dict[str, MaskedConfig] = {
     "full": MaskedConfig(),
-    "lite": MaskedConfig(width=192, depth=5, heads=3, hidden=512, dropout=0.1, text_width=384, code_width=192),
+    "lite": MaskedConfig(
+        width=192, depth=4, heads=3, hidden=512, dropout=0.1, text_width=384, code_width=192, small_init=False
+    ),
 }
 
 
@@ -84,7 +86,9 @@ class ResidualTransformer(nn.Module):
         self.tables = nn.Parameter(torch.empty(len(config.codes), config.codes[0], config.code_width))
         self.level = nn.Embedding(len(config.codes), config.width)
         self.trunk = Trunk(config, config.code_width)
-        nn.init.normal_(self.tables, std=0.02)
+        nn.init.normal_(self.tables, std=0.02 if config.small_init else config.code_width**-0.5)
+        if not config.small_init:  # what is read of the tables weighs as much as the positions
+            self.trunk.token_proj.weight.data.mul_(config.code_width**0.5)
 
     def forward(self, ids: tuple[Tensor, ...], level: Tensor, real: Tensor, pooled: Tensor) -> Tensor:
         """ids int64 [B, T] a level, of which those below `level` (int64 [B], from 1) are read -> logits [B, T, V]."""
@@ -123,7 +127,8 @@ class MaskedResidual(nn.Module):
         self.masked = MaskedTransformer(config)
         self.residual = ResidualTransformer(config)
         self.length = LengthEstimator(config.text_width, config.length_classes) if config.length_classes else None
-        self.apply(init)
+        if config.small_init:
+            self.apply(small_init)
 
     def length_class(self, lengths: Tensor) -> Tensor:
         """Frames int64 [B] -> class int64 [B]."""

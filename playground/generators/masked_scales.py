@@ -19,10 +19,10 @@ from playground.generators.masking import (
     branch_logits,
     corrupt,
     draw_hidden,
-    init,
     null_text,
     prediction_loss,
     redraw_rows,
+    small_init,
     text_branches,
 )
 from playground.nn.attention import Memory
@@ -45,8 +45,12 @@ class MaskedScalesConfig(TrunkConfig):
     null_words: int = 16  # words of the null text that free-form generation reads
 
 
-_LITE = MaskedScalesConfig(width=192, depth=5, heads=3, hidden=512, dropout=0.1, text_width=384, code_width=192)
-MASKED_SCALES_PRESETS: dict[str, MaskedScalesConfig] = {"full": MaskedScalesConfig(), "lite": _LITE}
+MASKED_SCALES_PRESETS: dict[str, MaskedScalesConfig] = {
+    "full": MaskedScalesConfig(),
+    "lite": MaskedScalesConfig(
+        width=192, depth=5, heads=3, hidden=512, dropout=0.1, text_width=384, code_width=192, small_init=False
+    ),
+}
 
 
 class MaskedScales(nn.Module):
@@ -57,7 +61,8 @@ class MaskedScales(nn.Module):
         self.config = config
         self.tokens = nn.Embedding(config.codes[0] + 2, config.code_width)  # codes, mask, pad; shared by all scales
         self.trunk = Trunk(config, config.codes[0], memories=int(config.variant == "cross"))
-        self.apply(init)
+        if config.small_init:
+            self.apply(small_init)
 
     def positions(self, sizes: tuple[int, ...]) -> Tensor:
         """Places [S] of the tokens of a batch: every scale starts where it does in the longest motion."""
