@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.browser.server import CHROMIUM_FLAGS, chromium, serving
 
@@ -35,15 +35,13 @@ class Visit:
             count = len(self.requests)
             self.page.wait_for_timeout(500)
 
-    def type(self, box: Locator, text: str) -> None:
-        """Type into a control until it keeps the words: a page that is still waking up puts its own back once."""
-        held = 0
-        while held < 3:
-            if box.input_value() != text:
-                box.fill(text)
-                held = 0
-            self.page.wait_for_timeout(150)
-            held = held + 1 if box.input_value() == text else 0
+    def wake(self, go: str) -> None:
+        """Press a button once and wait for its run: the first press wakes the whole page, which may put its own words
+        back once; what is typed after that stays."""
+        button = self.page.locator(go)
+        button.click()
+        expect(button).to_be_disabled()
+        expect(button).to_be_enabled()
 
     def sent_since(self, mark: int) -> list[str]:
         """Requests that went out after the list had `mark` entries, streams that stay open left aside."""

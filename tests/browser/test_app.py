@@ -66,8 +66,8 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
 
     seen.enter("Generate")
     seen.settle()
-    seen.type(page.locator("#generate-prompt textarea"), "a person walks in a circle")
-    seen.type(page.locator("#generate-seed input"), "3")
+    page.locator("#generate-prompt textarea").fill("a person walks in a circle")
+    page.locator("#generate-seed input").fill("3")
     page.locator("#generate-go").click()
     expect(page.locator("#generate-stage .ms-badge")).to_contain_text("live")
     expect(page.locator("#generate-go")).to_be_enabled()
@@ -75,7 +75,7 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
 
     seen.enter("Guidance")
     seen.settle()
-    seen.type(page.locator("#guidance-caption").locator("input, textarea"), "a person sneaks")
+    page.locator("#guidance-caption").locator("input, textarea").fill("a person sneaks")
     page.locator("#guidance-go").click()
     expect(page.locator("#guidance-stage .ms-badge")).to_contain_text("live")
 
@@ -91,7 +91,8 @@ def test_the_same_seed_shows_the_same_tokens(visit: Go, app: str) -> None:
         page = seen.enter("Generate")
         seen.settle()
         expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Generated")
-        seen.type(page.locator("#generate-seed input"), "11")
+        seen.wake("#generate-go")
+        page.locator("#generate-seed input").fill("11")
         page.locator("#generate-go").click()
         expect(page).to_have_url(re.compile("seed=11"))
         expect(page.locator("#generate-go")).to_be_disabled()

@@ -56,8 +56,9 @@ def test_a_token_is_forced_and_the_visit_leads_back(seen: Visit) -> None:
 
 def test_seeds_stand_side_by_side_and_their_link_shows_the_same(seen: Visit, visit: Go) -> None:
     page = seen.page
-    seen.type(page.locator("#generate-takes input"), "3")
-    seen.type(page.locator("#generate-seed input"), "5")
+    seen.wake("#generate-go")
+    page.locator("#generate-takes input").fill("3")
+    page.locator("#generate-seed input").fill("5")
     page.locator("#generate-go").click()
     page.wait_for_function(DONE, arg=3)
     expect(page.locator("#generate-stage .ms-labels")).to_contain_text("Seed 6")
