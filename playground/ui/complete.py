@@ -6,6 +6,7 @@ from typing import Any
 from playground.systems import row_of
 from playground.ui.comparing import MOTION, VARIATIONS, chosen, is_clip, is_origin, origin_caption, settings_of, span_of
 from playground.ui.drawing import MADE
+from playground.ui.editing import opening_motion
 from playground.ui.rooms.embedding import first_clip
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State, controls_of
@@ -52,7 +53,7 @@ def _system(services: Services, state: State) -> tuple[str, ...]:
 
 def _motion(services: Services, state: State) -> str:
     if state.room != "embedding-map":
-        return services.opening_example().id
+        return opening_motion(services) if state.room == "edit" else services.opening_example().id
     bundle = services.bundle(str(state.system))
     return bundle.clips[first_clip(bundle)].id
 

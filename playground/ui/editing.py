@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from playground.findings import Edited
 
 NAME = "edit"
+OPENING = "clip-walk"  # the room opens with it: raising the arms there moves them farthest of what was tried
 BEFORE, AFTER = "before", "after"
 _DOES = {
     "inpaint": "The span is drawn anew between what comes before and after.",
@@ -83,10 +84,20 @@ class EditSession:
     caption: str = ""
     base: Tokenized | Generation | None = None
     upload: Source | None = None
+    start: float = 0.0  # second at which the window of a long file begins
 
 
-def open_source(services: Services, held: EditSession, name: str, caption: str | None = None) -> EditSession:
-    """A motion of the library, the visitor's own file or a generated motion, tokenized. caption None: its own."""
+def opening_motion(services: Services) -> str:
+    """The id of the example that the room opens with."""
+    return OPENING if OPENING in {one.id for one in services.examples()} else services.opening_example().id
+
+
+def open_source(
+    services: Services, held: EditSession, name: str, caption: str | None = None, start: float = 0.0
+) -> EditSession:
+    """A motion of the library, the visitor's own file or a generated motion, tokenized. caption None: its own; start:
+    second of a long file at which the window begins."""
+    held = replace(held, start=start if name.startswith(OWN_FILE) else 0.0)
     if name.startswith(MADE):
         made = made_again(services, name, caption or "")
         return replace(held, name=name, title=made.prompt or "A generated motion", caption=made.prompt, base=made)
@@ -95,7 +106,7 @@ def open_source(services: Services, held: EditSession, name: str, caption: str |
             raise PlaygroundError(
                 f"this link was made with a file of its maker's own, {name.removeprefix(OWN_FILE)}; upload it"
             )
-        motion, title, own = held.upload.window(), held.upload.title, held.upload.caption
+        motion, title, own = held.upload.window(held.start), held.upload.title, held.upload.caption
     else:
         found = services.example(name)
         motion, title, own = found.motion(), found.title, found.caption
@@ -111,7 +122,7 @@ def source_view(services: Services, session: EditSession) -> View:
     system = services.default_system()
     figure = scene.figure(BEFORE, "Before", base.motion.joints, None, session.title)
     track = score(system, base.motion.frames, base.levels, services.palettes(system.name))
-    stage = scene.payload([figure], [track], scene=f"source {session.name} {base.motion.frames}")
+    stage = scene.payload([figure], [track], scene=f"source {session.name} {session.start:g} {base.motion.frames}")
     return View(stage=stage, seconds=max(base.seconds, time.perf_counter() - began))
 
 
@@ -180,8 +191,8 @@ def file_name(source: Source) -> str:
 
 
 def opening_view(services: Services) -> View:
-    """The room's first result: somebody who walks waves on the way."""
-    session = open_source(services, EditSession(), services.opening_example().id)
+    """The room's first result: somebody who walks raises both arms on the way."""
+    session = open_source(services, EditSession(), opening_motion(services))
     own = services.sampling()
     prompt = str(control(NAME, "prompt").default)
     return run(services, session, EditWish(prompt, "inpaint", None, 0, own.guidance, own.cfg, "place", False))

@@ -2,11 +2,14 @@
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import PHONE, Visit
+from tests.conftest import drifting
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
@@ -102,3 +105,20 @@ def test_a_phone_never_scrolls_sideways(visit: Go, stand_in: str) -> None:
     page = visit(f"{stand_in}?room=edit", viewport=PHONE, has_touch=True, is_mobile=True).page
     page.wait_for_function(SHOWN, arg=2)
     assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_a_long_upload_shows_its_window(seen: Visit, tmp_path: Path) -> None:
+    path = tmp_path / "long.npz"
+    np.savez(path, joints=drifting(500), fps=20.0)
+    page = seen.page
+    window = page.locator("#edit-start input[type=range]")
+    expect(window).to_have_count(0)
+    page.locator("#edit-upload").locator("xpath=..").locator("input[type=file]").set_input_files(path)
+    expect(window).to_be_visible()
+    page.wait_for_function(SHOWN, arg=1)
+    expect(page.locator("#edit-stage .ms-time")).to_contain_text("9.80 s")
+    before = page.evaluate(IDS)
+    window.focus()
+    window.press("End")
+    page.wait_for_function(f"(old) => JSON.stringify(({IDS})()) !== JSON.stringify(old)", arg=before)
+    expect(page).to_have_url(re.compile("motion=file.*start=15.2"))

@@ -101,6 +101,14 @@ def edit(services: Services, state: State, left: Left) -> None:
     assert [astuple(seam) for seam in left["edited"].seams] == [astuple(seam) for seam in edited.seams]
 
 
+def edit_of_a_window(services: Services, state: State, left: Left) -> None:
+    from playground.ui.uploads import read_upload
+
+    tokens = default_engine().tokenize(read_upload("my walk.npz").window(2.5), "a person drifts")
+    edited = default_engine().edit(tokens, (40, 80), "a person bows", 0)
+    assert ids(left["edited"].levels) == ids(edited.levels)
+
+
 def compare(services: Services, state: State, left: Left) -> None:
     *_, done = compare_all(services, state.values["settings"], services.example_motion(str(state["motion"])))
     assert list(left["results"]) == [one.setting.name for one in done] == ["g = 0", "g = 4"]
@@ -133,6 +141,8 @@ ADDRESSES: list[tuple[str, str, Check]] = [
     ("generate", "prompt=a+person+jumps&seconds=2&seed=5&takes=2&take=1&changes=7.s3", generate),
     ("guidance", "motion=synthetic-run&caption=someone+hurries&g=3.5", guidance),
     ("edit", "motion=synthetic-kick&kind=suffix&from=0&to=1.5&prompt=a+person+bows&seed=2&measured=1", edit),
+    ("edit", "motion=file%3Amy+walk.npz&start=2.5&caption=a+person+drifts&from=2&to=4&prompt=a+person+bows",
+     edit_of_a_window),
     ("compare", "vary=g&values=0_4&motion=synthetic-kick", compare),
     ("compare", "vary=kind&values=inpaint_suffix&motion=synthetic-kick&caption=a+kick&prompt=a+person+bows&seed=4"
      "&from=0.5&to=1.5", compare_edits),

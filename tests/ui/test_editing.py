@@ -1,5 +1,6 @@
 """What Edit asks for and shows, on the engine's stand-in: kept frames, spans, sources, links, words of errors."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -108,7 +109,7 @@ def test_a_generated_motion_comes_by_its_name_and_keeps_its_words(services: Serv
 
 def test_a_link_to_a_motion_alone_shows_it_with_a_span_to_begin_with(do: Handlers) -> None:
     shown = do.arrive(EditSession(), event(query="?room=edit&motion=m2&kind=inpaint"))
-    assert shown[0].name == "m2" and shown[9] > shown[8] >= 0
+    assert shown[0].name == "m2" and shown[10] > shown[9] >= 0
     plain = do.arrive(EditSession(), event(query="?room=edit&motion=m2"))
     assert plain[2] == "" and isinstance(plain[1], Noted)
     gone = do.arrive(EditSession(), event(query="?room=edit&motion=gone"))
@@ -144,3 +145,16 @@ def test_the_opening_says_what_its_controls_say(services: Services) -> None:
     made = opening_view(services).controls
     assert made["to"] > made["from"] and made["seams"] and made["promise"]
     assert {"prompt", "kind", "from", "to"} <= {row.key for row in controls_of("edit")}
+
+
+def test_a_long_file_shows_its_window_and_another_one_of_it(do: Handlers) -> None:
+    long = replace(motions()[0], joints=np.concatenate([motions()[0].joints] * 9)[:500])
+    held = open_source(do.services, EditSession(upload=Source(long, "long.bvh")), "file:long.bvh")
+    moved = do.move(5.0, "inpaint", held)
+    session, window = moved[0], moved[8]
+    assert window["visible"] and window["maximum"] == pytest.approx((500 - 197) / 20, abs=0.06)
+    assert session.start == window["value"] == 5.0 and moved[6] == "file:long.bvh"
+    assert not np.array_equal(session.base.motion.joints, held.base.motion.joints)
+    again = do.arrive(moved[0], event(query="?room=edit&motion=file%3Along.bvh&start=5&from=1&to=2"))
+    assert np.array_equal(again[0].base.motion.joints, session.base.motion.joints) and again[2] != ""
+    assert not do.choose("m2", "inpaint", session)[8]["visible"]

@@ -17,6 +17,7 @@ from playground.ui.editing import (
     file_name,
     motion_of,
     open_source,
+    opening_motion,
     opening_view,
     run,
     source_view,
@@ -52,13 +53,14 @@ SHOW_SPAN = """(start, stop) => {
 }"""
 KEEP = (
     "(motion, caption) => window.mtpState?.keep('edit', "
-    f"{json.dumps(['motion', 'caption', *WISHES, 'selection'])}, [motion, caption || null])"
+    f"{json.dumps(['motion', 'caption', *WISHES, 'start', 'selection'])}, [motion, caption || null])"
 )  # another motion: what was asked of the one before goes
 
 
 class Handlers:
     """What the controls do. A handler that shows a motion returns the values of `shown` in `room`: the session, stage,
-    facts, seams, promise, menu, the motion's name and caption for the address, start and end of the span."""
+    facts, seams, promise, menu, the motion's name and caption for the address, the window of a long file, start and end
+    of the span."""
 
     def __init__(self, services: Services, opening: View) -> None:
         self.services = services
@@ -74,9 +76,13 @@ class Handlers:
     def bring(self, path: str | None, kind: str, held: EditSession) -> tuple[Any, ...]:
         """A file of the visitor's own."""
         source = read_upload(path)
-        cut = " Only its first 9.8 s are used." if source.is_long else ""
         session = open_source(self.services, replace(held, upload=source), file_name(source))
-        return self._source(session, kind, f"{source.title}: {source.note}{cut}")
+        return self._source(session, kind, f"{source.title}: {source.note}")
+
+    def move(self, second: float, kind: str, held: EditSession) -> tuple[Any, ...]:
+        """Another window of a long file."""
+        session = self._held(held)
+        return self._source(open_source(self.services, session, session.name, session.caption, float(second)), kind)
 
     def last(self, address: str, kind: str, held: EditSession) -> tuple[Any, ...]:
         """What the room Generate shows, by its address."""
@@ -100,14 +106,14 @@ class Handlers:
     def arrive(self, held: EditSession, event: gr.EventData) -> tuple[Any, ...]:
         """What a link asks for: the controls, then the result, or the motion alone where nothing is said of an edit."""
         state, own = asked(event), self.services.sampling()
-        wanted = str(state["motion"] or self.services.opening_example().id)
+        wanted = str(state["motion"] or opening_motion(self.services))
         known = {one.id for one in self.services.examples()}
         if not wanted.startswith((MADE, OWN_FILE)) and wanted not in known:
-            wanted = self.services.opening_example().id
-        session = open_source(self.services, held, wanted, state.values.get("caption"))
+            wanted = opening_motion(self.services)
+        session = open_source(self.services, held, wanted, state.values.get("caption"), float(state["start"]))
         usual = {"g": own.guidance, "s": own.cfg}
         values = [state.values.get(key, usual.get(key, state[key])) for key in WISHES]
-        edits = set(state.values) - {"motion", "caption", "selection", "system"}
+        edits = set(state.values) - {"motion", "start", "caption", "selection", "system"}
         shown = self._edited(session, EditWish.checked(*values)) if edits else self._source(session, str(values[1]))
         return *shown, values[0], values[1], *values[4:], _about(str(values[1]))
 
@@ -130,12 +136,15 @@ class Handlers:
         if session.name.startswith(MADE):
             choices.insert(0, (f"{session.title} · generated", session.name))
         caption = session.caption if session.name.startswith(MADE) else ""
-        return gr.update(choices=choices, value=session.name), session.name, caption
+        long = session.upload if session.name.startswith(OWN_FILE) else None
+        last = max(0.1, round(long.last_start, 1)) if long else 0.1
+        window = gr.update(visible=bool(long and long.is_long), maximum=last, value=session.start)
+        return gr.update(choices=choices, value=session.name), session.name, caption, window
 
     def _held(self, held: EditSession) -> EditSession:
         if held.base is not None:
             return held
-        name = held.name or str(self.opening.controls.get("motion") or self.services.opening_example().id)
+        name = held.name or str(self.opening.controls.get("motion") or opening_motion(self.services))
         return open_source(self.services, held, name)
 
 
@@ -147,7 +156,7 @@ def room(services: Services) -> None:
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
         with panel("Change a part of a motion", LEAD, compare=True):
-            example, upload, last = _sources(services, opening)
+            example, upload, last, window = _sources(services, opening)
             wishes = _controls(services, opening)
             message = message_place("edit-message")
             facts = gr.HTML(opening.facts_html(), elem_id="edit-facts", apply_default_css=False)
@@ -158,13 +167,13 @@ def room(services: Services) -> None:
         door = link_door(NAME)
         gr.HTML("", js_on_load=SPANNING, apply_default_css=False, elem_classes=["mtp-unseen"])
         unseen = [gr.Textbox(elem_classes=["mtp-unseen"], show_label=False, container=False) for _ in range(3)]
-    shown = [session, stage, facts, seams, promise, example, *unseen[:2], wishes["from"], wishes["to"]]
+    shown = [session, stage, facts, seams, promise, example, *unseen[:2], window, wishes["from"], wishes["to"]]
     _wire(Handlers(services, opening), shown, wishes, (upload, last, unseen[2], door), message)
 
 
 def _wire(do: Handlers, shown: list[Any], wishes: dict[str, Any], ways_in: tuple[Any, ...], message: Any) -> None:
     """What happens at which event."""
-    session, stage, _, _, _, example, name, caption, start, stop = shown
+    session, stage, _, _, _, example, name, caption, window, start, stop = shown
     upload, last, address, door = ways_in
     kind, about, go = wishes["kind"], wishes["about"], wishes["go"]
     own: dict[str, Any] = {"stage": NAME, "doing": OPENING}
@@ -174,11 +183,14 @@ def _wire(do: Handlers, shown: list[Any], wishes: dict[str, Any], ways_in: tuple
     opened.append(attach(upload.upload, do.bring, [upload, kind, session], shown, message, **own))
     told = last.click(None, None, [address], js="() => window.mtpState?.query('generate') ?? ''", **silent)
     opened.append(attach(told.then, do.last, [address, kind, session], shown, message, stage=NAME, doing=LAST))
+    opened.append(attach(window.input, do.move, [window, kind, session], shown, message,
+                         trigger_mode="always_last", **own))  # fmt: skip
     opened.append(attach(kind.input, do.set_kind, [kind, session], [session, about, start, stop], message))
     for event in opened:
         event.then(None, [start, stop], None, js=SHOW_SPAN, **silent)
     for event in opened[:3]:
         event.then(None, [name, caption], None, js=KEEP, **silent)
+    commits(NAME, {"start": window}, window.input, forget=(*WISHES, "selection"))
     for number in (start, stop):
         number.input(None, [start, stop], None, js=SHOW_SPAN, **silent)
     stage.span(None, [start, stop], [start, stop], js=READ_SPAN, **silent)
@@ -198,7 +210,9 @@ def _sources(services: Services, opening: View) -> tuple[Any, ...]:
         )  # fmt: skip
         upload = gr.UploadButton("Upload", file_count="single", size="sm", scale=0, min_width=72, elem_id="edit-upload")
         last = gr.Button("Last generated", size="sm", scale=0, min_width=116, elem_id="edit-last")
-    return example, upload, last
+    row = control(NAME, "start")
+    window = gr.Slider(0, 1, value=0, step=0.1, visible=False, elem_id=row.element, label=row.label)
+    return example, upload, last, window
 
 
 def _controls(services: Services, opening: View) -> dict[str, Any]:

@@ -183,7 +183,7 @@ def room(services: Services) -> None:
     commits(NAME, {"motion": example}, example.input, forget=("caption", *own))
     commits(NAME, {"motion": upload}, upload.upload, forget=("caption", *own))
     commits(NAME, {"caption": caption}, caption.submit, go.click, forget=own[1:])
-    commits(NAME, {"start": start}, start.release, forget=own[1:])
+    commits(NAME, {"start": start}, start.input, forget=own[1:])
     commits(NAME, {"system": system}, system.input, forget=own[1:])
 
 
