@@ -25,7 +25,7 @@ SIZE ?= cpu
 MINUTES ?=
 QUEUE = --library $(LIBRARY) --size $(SIZE) $(if $(MINUTES),--minutes $(MINUTES))
 
-.PHONY: help setup app test notebooks figures train family ablations bench lint format screenshots clean
+.PHONY: help setup app test notebooks figures train family others ablations bench lint format screenshots clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 24
@@ -64,6 +64,9 @@ train: $(DEV) $(LIBRARY)/library.json ## train SYSTEM_NAME: its tokenizer, its g
 
 family: $(DEV) $(LIBRARY)/library.json ## train the LG-Tok family, what is missing of it (SIZE=cpu or gpu, MINUTES=n); stops and goes on at will
 	$(BIN)/python -m playground.training.train_family $(QUEUE)
+
+others: $(DEV) $(LIBRARY)/library.json ## train the other papers' systems, what is missing of them (MINUTES); stops and goes on at will
+	$(BIN)/python -m playground.training.train_others --library $(LIBRARY) $(if $(MINUTES),--minutes $(MINUTES))
 
 ablations: $(DEV) $(LIBRARY)/library.json ## train and measure the ablations, one after another (SIZE, MINUTES); stops and goes on at will
 	$(BIN)/python -m playground.training.ablations $(QUEUE)

@@ -11,7 +11,13 @@ from typing import Any, TypeVar
 from torch import nn
 
 from playground.errors import PlaygroundError
+from playground.generators.autoregressive import GPT, GPTConfig, GPTGenerator
+from playground.generators.diffusion import DiffusionConfig, DiffusionGenerator, build_denoiser
+from playground.generators.hierarchical import HierarchicalConfig, HierarchicalGenerator, RQHCTransformer
+from playground.generators.masked import MaskedConfig, MaskedGenerator, MaskedResidual
+from playground.generators.masked_scales import MaskedScales, MaskedScalesConfig, MaskedScalesGenerator
 from playground.generators.scalewise import GeneratorConfig, ScalewiseGenerator, build_generator
+from playground.tokenizers.convolutional import ConvConfig, build_conv
 from playground.tokenizers.transformer import TokenizerConfig, build_tokenizer
 
 Config = TypeVar("Config")
@@ -39,6 +45,14 @@ ARCHITECTURES: dict[str, Architecture] = {
         GeneratorConfig,
         build_generator,
         lambda network, tokenizer: ScalewiseGenerator(network, tokenizer.quantizer),
+    ),
+    "conv": Architecture("tokenizer", ConvConfig, build_conv),
+    "masked": Architecture("generator", MaskedConfig, MaskedResidual, MaskedGenerator),
+    "masked-scales": Architecture("generator", MaskedScalesConfig, MaskedScales, MaskedScalesGenerator),
+    "gpt": Architecture("generator", GPTConfig, GPT, GPTGenerator),
+    "rqhc": Architecture("generator", HierarchicalConfig, RQHCTransformer, HierarchicalGenerator),
+    "diffusion": Architecture(
+        "generator", DiffusionConfig, build_denoiser, lambda network, tokenizer: DiffusionGenerator(network), False
     ),
 }
 

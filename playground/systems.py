@@ -5,7 +5,7 @@
 
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -83,6 +83,32 @@ def _ours(name: str, title: str, *, scalewise: bool = True) -> SystemRow:
     )
 
 
+def _theirs(
+    name: str,
+    title: str,
+    family: str,
+    tokenizer: str | None,
+    generator: str,
+    sampling: SamplingDefaults,
+    lends: str = "",
+    aligned: bool = True,
+) -> SystemRow:
+    """A row of another paper's system that this repository trains.
+
+    aligned: convolutions over each motion's own length tie latents to spans of frames.
+    """
+    return SystemRow(
+        name, title, family, tokenizer, generator, latents_are_frames=aligned, sampling=sampling, lends=lends
+    )
+
+
+_RVQ, _GPT = "convolutions, residual levels", "GPT, one token after the other"
+_SCALES = "convolutions with attention, scales with one codebook"
+_MASKED = SamplingDefaults(guidance=0.0, cfg=4.0, top_k=0.1, top_p=1.0)  # B2
+_MASKED_SCALES = replace(_MASKED, cfg=5.0)  # E4, HumanML3D
+_CAUSAL = SamplingDefaults(guidance=0.0, cfg=2.0)  # the papers guide neither; ours
+_DENOISED = SamplingDefaults(guidance=0.0, cfg=2.5)  # D4
+
 SYSTEMS: dict[str, SystemRow] = {
     row.name: row
     for row in (
@@ -114,8 +140,36 @@ SYSTEMS: dict[str, SystemRow] = {
             command="convert",
             sampling=SamplingDefaults(guidance=1.0, cfg=2.0),
         ),
+        _theirs(
+            "mosa", "MoSa", "mosa", "convolutions with attention, scales", "scale-wise autoregression",
+            SamplingDefaults(guidance=0.0, cfg=4.0), aligned=False,
+        ),
+        _theirs("momask", "MoMask", "momask", _RVQ, "masked and residual transformers", _MASKED),
+        _theirs(
+            "momask-lgtok", "MoMask on LG-Tok's tokenizer", "momask", "LG-Tok transformer, plain residual levels",
+            "masked and residual transformers", _MASKED, lends="lgtok-rvq", aligned=False,
+        ),
+        _theirs("momaskpp", "MoMask++", "momask++", _SCALES, "one masked transformer, text in front", _MASKED_SCALES),
+        _theirs(
+            "momaskpp-cross", "MoMask++ with cross-attention", "momask++", _SCALES,
+            "one masked transformer, cross-attention to text", _MASKED_SCALES, lends="momaskpp",
+        ),
+        _theirs("t2mgpt", "T2M-GPT", "t2mgpt", "convolutions, one level", f"{_GPT}, pooled text", _CAUSAL),
+        _theirs(
+            "t2mgpt-casim", "T2M-GPT with CASIM", "t2mgpt", "convolutions, one level", f"{_GPT}, all words", _CAUSAL,
+            lends="t2mgpt",
+        ),
+        _theirs("mdm", "MDM", "mdm", None, "diffusion, pooled text", _DENOISED, aligned=False),
+        _theirs("mdm-casim", "MDM with CASIM", "mdm", None, "diffusion, all words in front", _DENOISED, aligned=False),
+        _theirs(
+            "mdm-casim-decoder", "MDM with CASIM, decoder", "mdm", None, "diffusion, cross-attention to words",
+            _DENOISED, aligned=False,
+        ),
+        _theirs(
+            "mogo", "MOGO", "mogo", f"{_RVQ} with learned scale and bias", "one causal transformer a level", _CAUSAL
+        ),
     )
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

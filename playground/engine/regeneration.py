@@ -27,14 +27,18 @@ def alternatives(
     count: int,
     check: Check | None,
 ) -> Alternatives:
-    """The most probable codes of one token of a generated or real motion, given the coarser scales that are there."""
+    """The most probable codes of one token of a generated or real motion, given what was drawn before it.
+
+    A generator without a likelihood (a masked one) is asked for this token with all others of its scale given.
+    """
     from playground.probes import chances, draw_scales, keep
 
     began = time.perf_counter()
     level, place = check_place(result.levels, scale, position)
-    nothing = [np.zeros(one.size, bool) for one in result.levels]
+    hidden = [np.zeros(one.size, bool) for one in result.levels]
+    hidden[level][place] = not runtime.drawing.likelihood
     steps = draw_scales(
-        runtime, result.caption or None, result.motion.frames, (0,), how, check, keep(result.levels, nothing)
+        runtime, result.caption or None, result.motion.frames, (0,), how, check, keep(result.levels, hidden)
     )
     step, logits = next((step, found) for step in steps if (found := step.logits_of(scale)) is not None)
     guided, drawn = chances(logits[0, place], how)

@@ -51,7 +51,8 @@ FAMILIES: dict[str, SystemColor] = {
     "t2mgpt": SystemColor("#cc79a7", "#e09cc2"),
     "mdm": SystemColor("#a3860a", "#b0a040"),
 }
-_VARIANT_STEPS = {"mid": 1, "mini": 2, "tiny": 3, "notext": 1, "withouttext": 1, "nolanguage": 1, "casim": 1}
+_VARIANT_STEPS = {"mid": 1, "mini": 2, "tiny": 3, "notext": 1, "withouttext": 1, "nolanguage": 1, "casim": 1,
+                  "decoder": 1, "cross": 1, "momasklgtok": 1}  # fmt: skip
 _STEP_LIGHTNESS = (0.0, 0.11, -0.11, 0.18)
 _STEP_DASH = ("solid", "dash", "dot", "dashdot")
 

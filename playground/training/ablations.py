@@ -103,7 +103,7 @@ def ablations(size: str) -> dict[str, TokenizerTraining]:
     start = base(size)
 
     def model(**changes: object) -> TokenizerTraining:
-        return replace(start, model=replace(start.model, **changes))  # type: ignore[arg-type]
+        return replace(start, model=replace(start.model, **changes))
 
     tokenizer = {"in": {}, "cross": {"text_mixing": "cross", "motion_mixing": "cross"}}
     detokenizer = {"in": {"text_mixing_out": "in-context", "latent_mixing_out": "in-context"}, "cross": {}}

@@ -1,12 +1,13 @@
 """Every training run by name: what is trained, on how much, with which numbers. Rows of a table, not code."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from playground.data.batches import BatchConfig
 from playground.errors import PlaygroundError
 from playground.evaluation.networks import EvaluatorConfig
-from playground.generators.scalewise import GENERATOR_PRESETS, GeneratorConfig
-from playground.tokenizers.transformer import PRESETS, TokenizerConfig
+from playground.generators.scalewise import GENERATOR_PRESETS
+from playground.tokenizers.transformer import PRESETS
 
 
 @dataclass(frozen=True)
@@ -27,16 +28,18 @@ class Schedule:
 
 @dataclass(frozen=True)
 class TokenizerTraining:
-    """One tokenizer run (systems.md A7)."""
+    """One tokenizer run (systems.md A7; of the others A9, B1, C1, D3, E3)."""
 
-    model: TokenizerConfig
+    model: Any  # config of a tokenizer of architectures.py
     batch: BatchConfig = field(default_factory=BatchConfig)
     schedule: Schedule = field(default_factory=Schedule)
     text: str = "minilm"  # text encoder
     synthetic: float = 0.1  # synthetic clips as a share of the training clips
     language_drop: float = 0.1  # share of samples without text (A5)
     commitment: float = 0.02
-    heading: float = 0.0  # weight of smoothL1 on the accumulated heading; not in the paper, 0 there
+    heading: float = 0.0  # weight of smoothL1 on the accumulated heading; not in the papers, 0 there
+    joints: float = 0.0  # weight of smoothL1 on the joint positions, columns 4 to 66 (A9, B1)
+    velocity: float = 0.0  # weight of smoothL1 on differences of successive rows (D3)
     masked_mean: bool = False  # True: mean over real frames only; the released code counts padded frames as zeros
     clips: int = 0  # the first so many clips of the training list; 0: all
     longest: int = 0  # clips of more rows are left out; 0: none
@@ -56,9 +59,9 @@ TOKENIZERS: dict[str, TokenizerTraining] = {
 
 @dataclass(frozen=True)
 class GeneratorTraining:
-    """One generator run (systems.md A10)."""
+    """One generator run (systems.md A10; of the others B2, B3, C2, D3, E4)."""
 
-    model: GeneratorConfig
+    model: Any  # config of a generator of architectures.py
     tokenizer: str  # the tokenizer run whose checkpoint it draws from
     batch: BatchConfig = field(default_factory=BatchConfig)
     schedule: Schedule = field(default_factory=Schedule)
@@ -66,9 +69,10 @@ class GeneratorTraining:
     variants: int = 5  # windows tokenized of every clip
     text: str = "minilm"
     synthetic: float = 0.1
-    keep: float = 0.5  # share of the input tokens kept; the others become random codes
+    keep: float = 0.5  # scale-wise only: share of the input tokens kept; the others become random codes
     caption_drop: float = 0.1
     seed: int = 0
+    lent: bool = False  # is the tokenizer another system's, from its run beside this one or shipped?
 
 
 GENERATORS: dict[str, GeneratorTraining] = {
@@ -81,6 +85,19 @@ GENERATORS: dict[str, GeneratorTraining] = {
         keep=0.8,  # 0.5 in its first 1,500 steps
     ),
 }
+
+
+@dataclass(frozen=True)
+class FeatureTraining:
+    """One run of a generator without tokens (systems.md D4)."""
+
+    model: Any  # config of a generator of architectures.py
+    batch: BatchConfig = field(default_factory=BatchConfig)
+    schedule: Schedule = field(default_factory=Schedule)
+    text: str = "minilm"
+    synthetic: float = 0.1
+    caption_drop: float = 0.1
+    seed: int = 0
 
 
 @dataclass(frozen=True)

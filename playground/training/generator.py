@@ -1,4 +1,4 @@
-"""Training the scale-wise generator on the tokens of a frozen tokenizer (systems.md A10)."""
+"""Training a generator on the tokens of a frozen tokenizer (systems.md A10, B2, B3, C2, D3, E4)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from playground.checkpoints import Card, save_checkpoint
 from playground.data.batches import BatchSource
@@ -16,8 +17,8 @@ from playground.generators.base import TokenBatch, TokenNetwork
 from playground.nn.transfer import on_device
 from playground.text.encoders import TextEncoder, identify
 from playground.text.store import FeatureStore
+from playground.tokenizers.base import Tokenizer
 from playground.tokenizers.quantizers import MultiScaleQuantizer
-from playground.tokenizers.transformer import LGTok
 from playground.training.configs import GeneratorTraining
 
 
@@ -25,17 +26,19 @@ from playground.training.configs import GeneratorTraining
 class TokenBank:
     """Tokens of many windows of many clips, drawn once from the frozen tokenizer.
 
-    ids: int16 [n, sum of scales]; lengths: int64 [n] frames; captions: the text that guided each one; weights: [n].
+    ids: int16 [n, sum of scales], every scale filled up to full length with 0; counts: int64 [n, N] real tokens of
+    every scale; lengths: int64 [n] frames; captions: the text that guided each one; weights: [n].
     """
 
     ids: NDArray[np.int16]
+    counts: NDArray[np.int64]
     lengths: NDArray[np.int64]
     captions: list[str]
     weights: NDArray[np.float64]
 
 
 def build_bank(
-    tokenizer: LGTok,
+    tokenizer: Tokenizer,
     source: BatchSource,
     texts: FeatureStore,
     variants: int,
@@ -52,12 +55,15 @@ def build_bank(
         batch = source.fill(cuts.take(slice(start, start + source.config.size)))
         text = texts.lookup(batch.captions).to(device)
         tokens = tokenizer.encode(batch.features.to(device), batch.lengths.to(device), text).tokens
-        rows.append(torch.cat(tokens.ids, dim=1).cpu().numpy().astype(np.int16))
+        full = [F.pad(i, (0, s - i.shape[1])) for i, s in zip(tokens.ids, tokenizer.config.scales, strict=True)]
+        rows.append(torch.cat(full, dim=1).cpu().numpy().astype(np.int16))
         captions.extend(batch.captions)
         if progress:
             progress(len(captions), len(cuts))
     weights = source.weights[cuts.sample]
-    return TokenBank(np.concatenate(rows), cuts.rows, captions, weights / weights.sum())
+    sizes = {int(frames): tokenizer.sizes(int(frames)) for frames in np.unique(cuts.rows)}
+    counts = np.array([sizes[int(frames)] for frames in cuts.rows], np.int64)
+    return TokenBank(np.concatenate(rows), counts, cuts.rows, captions, weights / weights.sum())
 
 
 class GeneratorInputs:
@@ -109,13 +115,16 @@ class GeneratorTask:
         self.tokenizer_hash = tokenizer_hash
         self.device = device
 
-    def _levels(self, values: NDArray[np.generic]) -> tuple[Tensor, ...]:
-        """[B, sum of scales] on the device, one tensor a level."""
-        return on_device(values, self.device).split(self.quantizer.scales, dim=1)
+    def _levels(self, values: NDArray[np.generic], counts: NDArray[np.int64]) -> tuple[Tensor, ...]:
+        """[B, sum of scales] on the device, one tensor a level, as long as the longest of its counts [B, N]."""
+        whole = on_device(values, self.device).split(self.quantizer.scales, dim=1)
+        return tuple(level[:, :longest] for level, longest in zip(whole, counts.max(axis=0).tolist(), strict=True))
 
     def _batch(self, bank: TokenBank, rows: NDArray[np.int64]) -> TokenBatch:
-        ids = self._levels(bank.ids[rows].astype(np.int64))
-        masks = tuple(torch.ones_like(level, dtype=torch.bool) for level in ids)
+        counts = bank.counts[rows]
+        ids = self._levels(bank.ids[rows].astype(np.int64), counts)
+        levels = zip(self.quantizer.scales, counts.T, strict=True)
+        masks = self._levels(np.concatenate([np.arange(s) < n[:, None] for s, n in levels], axis=1), counts)
         text = self.texts.lookup([bank.captions[row] for row in rows])
         dropped = torch.zeros(len(rows), dtype=torch.bool, device=self.device)
         return TokenBatch(ids, masks, on_device(bank.lengths[rows], self.device), text, dropped)
@@ -129,11 +138,12 @@ class GeneratorTask:
         codes = np.repeat(self.quantizer.codes, self.quantizer.scales)
         keep = rng.random((c.size, len(codes))) < c.keep
         other = rng.integers(0, codes, (c.size, len(codes)))
-        batch = self._batch(self.bank, rows[rank::world])
-        mixed = (batch.ids, self._levels(keep[rank::world].copy()), self._levels(other[rank::world].copy()))
+        mine, counts = slice(rank, None, world), self.bank.counts[rows[rank::world]]
+        batch = self._batch(self.bank, rows[mine])
+        mixed = (batch.ids, self._levels(keep[mine].copy(), counts), self._levels(other[mine].copy(), counts))
         batch = replace(
             batch,
-            dropped=on_device(dropped[rank::world].copy(), self.device),
+            dropped=on_device(dropped[mine].copy(), self.device),
             noisy=tuple(torch.where(kept, ids, random) for ids, kept, random in zip(*mixed, strict=True)),
         )
         own = torch.Generator().manual_seed(int(rng.integers(2**62)) + rank)

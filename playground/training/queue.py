@@ -15,7 +15,7 @@ from playground.errors import PlaygroundError
 from playground.launch import Launch, launched
 from playground.training.configs import GeneratorTraining, RefitTraining
 from playground.training.family import SIZES
-from playground.training.run import Order, Training, part_of, run_training
+from playground.training.run import Order, Training, part_of, run_training, tokenizer_of
 from playground.training.state import read_facts
 
 try:
@@ -52,8 +52,12 @@ class Job:
     @property
     def ready(self) -> bool:
         """Whether it can be begun: a generator needs its tokenizer, a refit both."""
-        needed = {GeneratorTraining: ("tokenizer",), RefitTraining: ("tokenizer", "generator")}
-        parts = needed.get(type(self.training), ())
+        if isinstance(self.training, GeneratorTraining):
+            try:
+                return tokenizer_of(self.training, self.out).is_file()
+            except PlaygroundError:
+                return False
+        parts = ("tokenizer", "generator") if isinstance(self.training, RefitTraining) else ()
         return all((self.out / part / "checkpoint.safetensors").is_file() for part in parts)
 
     @property
@@ -162,11 +166,12 @@ def _duration(seconds: float) -> str:
 # ---- what the commands share ----------------------------------------------------------------------------------------
 
 
-def add_arguments(parser: argparse.ArgumentParser, out: str) -> None:
-    """The options of a command that runs a queue."""
+def add_arguments(parser: argparse.ArgumentParser, out: str, sizes: Sequence[str] = SIZES) -> None:
+    """The options of a command that runs a queue; --size where there are several."""
     parser.add_argument("--library", type=Path, default=Path("library"), metavar="DIR")
     parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help=f"where runs are kept ({out})")
-    parser.add_argument("--size", choices=SIZES, default="cpu", help="the size that a CPU or a GPU trains (cpu)")
+    if len(sizes) > 1:
+        parser.add_argument("--size", choices=sizes, default="cpu", help="the size that a CPU or a GPU trains (cpu)")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these alone")
     parser.add_argument("--minutes", type=float, help="stop after so many minutes, everything saved")
     parser.add_argument("--accelerator", default="auto", choices=("auto", "cpu", "gpu"))
@@ -185,6 +190,19 @@ def limits_of(options: argparse.Namespace) -> Limits:
     deadline = None if options.minutes is None else time.monotonic() + 60 * options.minutes
     launch = Launch(options.accelerator, options.devices or "auto", precision=options.precision)
     return Limits(options.library, launch, deadline)
+
+
+def run_command(options: argparse.Namespace, jobs: list[Job], runs: Path) -> int:
+    """List or run a queue as the options say; runs: the folder of its systems. Returns the exit status."""
+
+    def run() -> None:
+        wanted = chosen(jobs, options.only)
+        if options.list:
+            say("\n".join(status(wanted)))
+        elif run_queue(wanted, limits_of(options), say):
+            say(f"all trained; python -m playground.training.ship {runs}/NAME --system NAME")
+
+    return guarded(run)
 
 
 def chosen(jobs: Sequence[Job], only: Sequence[str]) -> list[Job]:

@@ -19,15 +19,17 @@ from torch.nn import functional as F
 
 from playground.checkpoints import Card, read_card, save_checkpoint
 from playground.data.batches import Batch, BatchSource, Cuts
-from playground.generators.scalewise import Edit, ScalewiseGenerator, ScalewiseTransformer
+from playground.generators.base import Edit
+from playground.generators.scalewise import ScalewiseGenerator, ScalewiseTransformer
 from playground.motion.measures import CONTACT_HEIGHT, TOES
 from playground.motion.representation import Normaliser
 from playground.nn.sampling import Sampling
 from playground.nn.transfer import on_device
 from playground.text.store import FeatureStore
-from playground.tokenizers.transformer import LGTok, TrainingOutput
+from playground.tokenizers.base import TrainingOutput
+from playground.tokenizers.transformer import LGTok
 from playground.training.configs import RefitTraining
-from playground.training.tokenizer import reconstruction_errors, tokenizer_loss
+from playground.training.tokenizer import reconstruction_errors, tokenizer_loss, velocity_loss
 
 TOE_COLUMNS = torch.tensor([4 + 3 * (toe - 1) for toe in TOES])  # x of each toe; y and z follow
 REFIT = ("decoder", "from_code", "motion_out", "query_positions")  # what is trained
@@ -116,13 +118,6 @@ class RefitStep(nn.Module):
             rows, real = (x * self.std + self.mean for x in (out.float(), features))
             loss = loss + c.feet * foot_loss(rows, real, batch.lengths, batch.mean_frames)
         return loss, moved.detach()
-
-
-def velocity_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
-    """smoothL1 on the differences of successive rows of out and features [B, F, C], over real rows; scalar."""
-    inside = torch.arange(1, features.shape[1], device=lengths.device)[None] < lengths[:, None]
-    error = F.smooth_l1_loss(out.diff(dim=1), features.diff(dim=1), reduction="none").mean(dim=-1)
-    return (error * inside).sum() / mean_frames
 
 
 def foot_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:

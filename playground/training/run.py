@@ -8,24 +8,27 @@ from typing import Any
 
 import torch
 
+from playground.architectures import build, caller, fitted
 from playground.checkpoints import load_generator, load_tokenizer
 from playground.data.batches import BatchConfig, BatchSource, library_samples, synthetic_samples, whole_batches
 from playground.data.library import Library
+from playground.engine import ASSETS
 from playground.errors import PlaygroundError
 from playground.evaluation.networks import build_evaluator
-from playground.generators.scalewise import GeneratorConfig, ScalewiseGenerator, build_generator
 from playground.motion.representation import Normaliser
 from playground.motion.synthetic import corpus
 from playground.progress import Progress
+from playground.systems import checkpoint_path
 from playground.text.encoders import check_same, load_encoder
 from playground.text.store import FeatureStore
-from playground.tokenizers.transformer import LGTok, build_tokenizer
+from playground.tokenizers.base import Tokenizer
 from playground.training.configs import (
     EVALUATORS,
     GENERATORS,
     REFITS,
     TOKENIZERS,
     EvaluatorTraining,
+    FeatureTraining,
     GeneratorTraining,
     RefitTraining,
     TokenizerTraining,
@@ -33,12 +36,14 @@ from playground.training.configs import (
 )
 from playground.training.evaluator import EvaluatorTask
 from playground.training.family import FAMILY, SIZES
+from playground.training.features import FeatureTask
 from playground.training.generator import GeneratorTask, build_bank
 from playground.training.loop import Fit, Launch, Task, fit, start_fabric
+from playground.training.others import OTHERS
 from playground.training.refit import RefitTask, build_refit_bank
 from playground.training.tokenizer import TokenizerTask
 
-Training = TokenizerTraining | GeneratorTraining | RefitTraining | EvaluatorTraining
+Training = TokenizerTraining | GeneratorTraining | FeatureTraining | RefitTraining | EvaluatorTraining
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,7 @@ def find_training(name: str, size: str = "cpu") -> Training:
     """The training with that name. PlaygroundError for an unknown name or size."""
     if size not in SIZES:
         raise PlaygroundError(f"unknown size {size!r}; accepted: {', '.join(SIZES)}")
-    known: dict[str, Training] = {**FAMILY[size], **TOKENIZERS, **GENERATORS, **REFITS, **EVALUATORS}
+    known: dict[str, Training] = {**FAMILY[size], **TOKENIZERS, **GENERATORS, **OTHERS, **REFITS, **EVALUATORS}
     if name not in known:
         raise PlaygroundError(f"unknown training {name!r}; known are {', '.join(known)}")
     return known[name]
@@ -101,6 +106,8 @@ def run_training(training: Training, order: Order) -> dict[str, Any]:
         return _train_tokenizer(training, order)
     if isinstance(training, GeneratorTraining):
         return _train_generator(training, order)
+    if isinstance(training, FeatureTraining):
+        return _train_features(training, order)
     if isinstance(training, RefitTraining):
         return _train_refit(training, order)
     return _train_evaluator(training, order)
@@ -141,16 +148,13 @@ def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
     validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
     with torch.random.fork_rng():
         torch.manual_seed(config.seed)
-        model = build_tokenizer(replace(config.model, text_width=encoder.width))
+        model = build(fitted(config.model, text_width=encoder.width))
     task = TokenizerTask(model, config, batches, validation, store, encoder, library.name, fabric.device)
     return order.fit(fabric, task, config, out)
 
 
 def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
-    tokenizer_path = order.out / "tokenizer" / "checkpoint.safetensors"
-    if not tokenizer_path.is_file():
-        raise PlaygroundError(f"{tokenizer_path} is absent; train {config.tokenizer} into the same folder first")
-    tokenizer, card = load_tokenizer(tokenizer_path)
+    tokenizer, card = load_tokenizer(tokenizer_of(config, order.out))
     library, out = Library.open(order.library), order.out / part_of(config)
     normaliser = card.normaliser or library.normaliser
     fabric = start_fabric(order.launch, out)
@@ -168,10 +172,40 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
     checked = build_bank(tokenizer, held_out, store, 1, fabric.device) if held_out else None
     with torch.random.fork_rng():
         torch.manual_seed(config.seed)
-        model = build_generator(generator_config(config, tokenizer, encoder.width))
+        model = build(generator_config(config, tokenizer, encoder.width))
     task = GeneratorTask(
         model, tokenizer.quantizer, config, bank, checked, store, encoder, library.name, card.hash[:12], fabric.device
     )
+    return order.fit(fabric, task, config, out)
+
+
+def tokenizer_of(config: GeneratorTraining, out: Path, assets: Path = ASSETS) -> Path:
+    """The checkpoint whose tokens a generator run into `out` learns from: that of the run itself, or of the system that
+    lends it, from its run beside this one or as it is shipped. PlaygroundError if there is none."""
+    own = out / "tokenizer" / "checkpoint.safetensors"
+    lender = config.tokenizer.removesuffix("-tokenizer")
+    lent = (out.parent / lender / "tokenizer" / own.name, checkpoint_path(assets, lender, "tokenizer"))
+    places = lent if config.lent else (own,)
+    for path in places:
+        if path.is_file():
+            return path
+    where = f"into {out.parent / lender}" if config.lent else "into the same folder"
+    raise PlaygroundError(f"{places[0]} is absent; train {config.tokenizer} {where} first")
+
+
+def _train_features(config: FeatureTraining, order: Order) -> dict[str, Any]:
+    library, out = Library.open(order.library), order.out / part_of(config)
+    fabric = start_fabric(order.launch, out)
+    encoder = load_encoder(config.text)
+    batches = training_batches(library, config, library.normaliser, fabric.device)
+    held_out = library_samples(library, "val")
+    texts = [*batches.captions(), *(caption for sample in held_out for caption in sample.captions), ""]
+    store = FeatureStore.cached(order.library, texts, encoder)
+    validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        network = build(fitted(config.model, text_width=encoder.width))
+    task = FeatureTask(network, config, batches, validation, store, encoder, library.name, fabric.device)
     return order.fit(fabric, task, config, out)
 
 
@@ -192,8 +226,8 @@ def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
     store = FeatureStore.cached(order.library, texts, encoder).to(fabric.device)
     frozen, network = frozen.to(fabric.device), network.to(fabric.device)
     with Progress("drawing tokens of the training clips") as progress:
-        bank = build_refit_bank(ScalewiseGenerator(network, frozen.quantizer), frozen, batches, store, config, progress)
-    model = build_tokenizer(card.config)
+        bank = build_refit_bank(caller(network, frozen), frozen, batches, store, config, progress)
+    model = build(card.config)
     model.load_state_dict(frozen.state_dict(), strict=False)
     validation = whole_batches(held_out, normaliser, config.batch.size) if held_out else []
     task = RefitTask(model, config, bank, batches, validation, store, card, (network, generator_card), fabric.device)
@@ -217,7 +251,7 @@ def _train_evaluator(config: EvaluatorTraining, order: Order) -> dict[str, Any]:
     return order.fit(fabric, task, config, out)
 
 
-def generator_config(config: GeneratorTraining, tokenizer: LGTok, text_width: int) -> GeneratorConfig:
+def generator_config(config: GeneratorTraining, tokenizer: Tokenizer, text_width: int) -> Any:
     """The generator's config with the token shapes of its tokenizer and the width of its text encoder."""
     c = tokenizer.config
-    return replace(config.model, scales=c.scales, codes=c.codes, code_width=c.code_width, text_width=text_width)
+    return fitted(config.model, scales=c.scales, codes=c.codes, code_width=c.code_width, text_width=text_width)

@@ -1,7 +1,8 @@
 """Put a finished run into the assets: `python -m playground.training.ship RUN --system NAME`. Nothing else does that.
 
-RUN holds tokenizer/checkpoint.safetensors and, for a system that generates, generator/checkpoint.safetensors, as the
-train command leaves them: float16, self-describing. Everything is checked before the first byte is copied.
+RUN holds tokenizer/checkpoint.safetensors and, for a system that generates, generator/checkpoint.safetensors (the
+latter alone where another system lends the tokenizer, or there is none), as the train command leaves them: float16,
+self-describing. Everything is checked before the first byte is copied.
 """
 
 import argparse
@@ -13,14 +14,12 @@ from pathlib import Path
 
 from safetensors import safe_open
 
-from playground.checkpoints import Card, load_generator, load_tokenizer
+from playground.checkpoints import Card, load_generator, load_tokenizer, read_card
 from playground.engine import ASSETS
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.systems import checkpoint_path, row_of
 from playground.training.queue import guarded, say
-
-PARTS = ("tokenizer", "generator")
 
 
 def ship(run: Path, system: str, assets: Path = ASSETS) -> list[str]:
@@ -30,13 +29,15 @@ def ship(run: Path, system: str, assets: Path = ASSETS) -> list[str]:
     to another tokenizer, or a size would pass its limit; the assets are then as before.
     """
     row = row_of(system)
-    found = {part: run / part / "checkpoint.safetensors" for part in PARTS}
-    if not found["tokenizer"].is_file():
-        raise PlaygroundError(f"{found['tokenizer']} is absent; train the tokenizer of {system} into {run} first")
-    if row.generator is None or not found["generator"].is_file():
+    own = tuple(part for part in row.parts if part == "generator" or not row.lends)
+    found = {part: run / part / "checkpoint.safetensors" for part in own}
+    if not found[own[0]].is_file():
+        raise PlaygroundError(f"{found[own[0]]} is absent; train the {own[0]} of {system} into {run} first")
+    if "generator" in found and not found["generator"].is_file():
         del found["generator"]
-    cards = _checked(found)
-    old = {part: checkpoint_path(assets, system, part) for part in PARTS}
+    lent = checkpoint_path(assets, system, "tokenizer") if row.lends else None
+    cards = _checked(found, lent)
+    old = {part: checkpoint_path(assets, system, part) for part in own}
     sizes = sum(path.stat().st_size for path in found.values())
     if sizes > LIMITS.max_system_bytes:
         raise PlaygroundError(f"{run} holds {_mb(sizes)}; a system may have {_mb(LIMITS.max_system_bytes)}")
@@ -50,23 +51,31 @@ def ship(run: Path, system: str, assets: Path = ASSETS) -> list[str]:
         _copy(path, old[part])
         facts = cards[part].facts
         notes.append(f"{old[part]}: {_mb(path.stat().st_size)}, step {facts.get('step')}, {cards[part].hash[:12]}")
-    if "generator" not in found and old["generator"].is_file():
+    if "generator" in old and "generator" not in found and old["generator"].is_file():
         old["generator"].unlink()
         notes.append(f"{old['generator']}: removed, it drew the tokens of another tokenizer")
     return [*notes, f"{assets}: {_mb(stays + sizes)} of {_mb(LIMITS.max_asset_bytes)}"]
 
 
-def _checked(found: dict[str, Path]) -> dict[str, Card]:
-    """The cards of the files, read whole. PlaygroundError for what is wrong with them."""
-    cards = {"tokenizer": load_tokenizer(found["tokenizer"])[1]}
-    if cards["tokenizer"].normaliser is None:
-        raise PlaygroundError(f"{found['tokenizer']} carries no normaliser; it is not a finished tokenizer checkpoint")
+def _checked(found: dict[str, Path], lent: Path | None) -> dict[str, Card]:
+    """The cards of the files, read whole. lent: the shipped tokenizer of another system that a generator draws for.
+
+    PlaygroundError for what is wrong with them.
+    """
+    cards: dict[str, Card] = {}
+    if "tokenizer" in found:
+        cards["tokenizer"] = load_tokenizer(found["tokenizer"])[1]
     if "generator" in found:
         cards["generator"] = load_generator(found["generator"])[1]
-        if cards["generator"].facts.get("tokenizer") != cards["tokenizer"].hash[:12]:
-            raise PlaygroundError(
-                f"{found['generator']} was trained on the tokens of another tokenizer; train it again"
-            )
+    first = next(iter(found))
+    if lent is None and cards[first].normaliser is None:
+        raise PlaygroundError(f"{found[first]} carries no normaliser; it is not a finished {first} checkpoint")
+    if lent is not None and not lent.is_file():
+        raise PlaygroundError(f"{lent} is absent; ship the system that lends it first")
+    tokenizer = cards.get("tokenizer") if lent is None else read_card(lent)
+    drawn_from = cards["generator"].facts.get("tokenizer") if "generator" in cards else None
+    if tokenizer is not None and "generator" in cards and drawn_from != tokenizer.hash[:12]:
+        raise PlaygroundError(f"{found['generator']} was trained on the tokens of another tokenizer; train it again")
     for path in found.values():
         with safe_open(str(path), framework="pt") as file:
             for name in file.keys():  # noqa: SIM118

@@ -1,7 +1,7 @@
-"""Training an LG-Tok tokenizer: the loss of systems.md A7 and its validation figures."""
+"""Training a tokenizer: the loss of systems.md A7 with the terms of A9, B1 and D3, and its validation figures."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -15,9 +15,10 @@ from playground.motion.representation import Normaliser, from_features67
 from playground.nn.transfer import on_device
 from playground.text.encoders import TextEncoder, TextFeatures, identify
 from playground.text.store import FeatureStore
-from playground.tokenizers.transformer import LGTok, TrainingOutput
+from playground.tokenizers.base import Tokenizer, TrainingOutput
 from playground.training.configs import TokenizerTraining
 
+JOINTS = slice(4, None)  # columns of the joint positions
 HEADING_SCALE = 0.4  # radians of yaw that move an outstretched hand by about one standard deviation of the positions
 
 
@@ -29,7 +30,7 @@ def tokenizer_loss(
     heading_std: float,
     mean_frames: float,
 ) -> Tensor:
-    """smoothL1 on the features + weighted commitment (+ accumulated heading); scalar. heading_std: std of column 0.
+    """smoothL1 on the features + weighted commitment (+ the terms of `config`); scalar. heading_std: std of column 0.
 
     mean_frames: what sums over real frames are divided by (see Batch).
 
@@ -44,7 +45,19 @@ def tokenizer_loss(
         turned = ((reconstruction[..., 0] - features[..., 0]) * real).cumsum(dim=1) * (2 * heading_std / HEADING_SCALE)
         drift = F.smooth_l1_loss(turned, torch.zeros_like(turned), reduction="none") * real
         loss = loss + config.heading * drift.sum() / mean_frames
+    if config.joints:
+        apart = F.smooth_l1_loss(reconstruction[..., JOINTS], features[..., JOINTS], reduction="none").mean(dim=-1)
+        loss = loss + config.joints * (apart * real).sum() / mean_frames
+    if config.velocity:
+        loss = loss + config.velocity * velocity_loss(reconstruction, features, lengths, mean_frames)
     return loss + config.commitment * out.commitment
+
+
+def velocity_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
+    """smoothL1 on the differences of successive rows of out and features [B, F, C], over real rows; scalar."""
+    inside = torch.arange(1, features.shape[1], device=lengths.device)[None] < lengths[:, None]
+    error = F.smooth_l1_loss(out.diff(dim=1), features.diff(dim=1), reduction="none").mean(dim=-1)
+    return (error * inside).sum() / mean_frames
 
 
 class TokenizerInputs:
@@ -63,7 +76,7 @@ class TokenizerInputs:
 class TokenizerStep(nn.Module):
     """One training pass, loss included: what Fabric wraps, so that every process sees the whole of it."""
 
-    def __init__(self, model: LGTok, config: TokenizerTraining, heading_std: float) -> None:
+    def __init__(self, model: Any, config: TokenizerTraining, heading_std: float) -> None:
         super().__init__()
         self.tokenizer = model
         self.config = config
@@ -88,7 +101,7 @@ class TokenizerTask:
 
     def __init__(
         self,
-        model: LGTok,
+        model: Tokenizer,
         config: TokenizerTraining,
         batches: BatchSource,
         validation: list[Batch],
@@ -137,11 +150,11 @@ class TokenizerTask:
             facts=facts | {"seed": self.config.seed},
             normaliser=self.batches.normaliser,
         )
-        save_checkpoint(path, self.tokenizer, card)
+        save_checkpoint(path, cast(nn.Module, self.tokenizer), card)
 
 
 def reconstruction_errors(
-    tokenizer: LGTok, batches: list[Batch], texts: FeatureStore, normaliser: Normaliser, device: torch.device
+    tokenizer: Tokenizer, batches: list[Batch], texts: FeatureStore, normaliser: Normaliser, device: torch.device
 ) -> dict[str, float]:
     """MPJPE in mm of whole clips, over clips, as a mean over sources and of each source; true captions, g = 0."""
     errors: dict[str, list[float]] = {}

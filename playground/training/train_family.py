@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from playground.training.family import FAMILY
-from playground.training.queue import Job, add_arguments, chosen, guarded, limits_of, run_queue, say, status
+from playground.training.queue import Job, add_arguments, run_command
 
 
 def family_jobs(out: Path, size: str) -> list[Job]:
@@ -26,16 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m playground.training.train_family", description=about)
     add_arguments(parser, "runs/family")
     options = parser.parse_args(arguments)
-
-    def run() -> None:
-        jobs = chosen(family_jobs(options.out, options.size), options.only)
-        if options.list:
-            say("\n".join(status(jobs)))
-            return
-        if run_queue(jobs, limits_of(options), say):
-            say(f"all trained; python -m playground.training.ship {options.out / options.size}/NAME --system NAME")
-
-    return guarded(run)
+    return run_command(options, family_jobs(options.out, options.size), options.out / options.size)
 
 
 if __name__ == "__main__":

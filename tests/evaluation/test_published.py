@@ -16,7 +16,7 @@ from playground.evaluation.items import ITEMS as WINDOWS
 from playground.evaluation.items import draw_items, measurable, stream
 from playground.evaluation.published import __main__ as command
 from playground.evaluation.published import base, motions
-from playground.evaluation.published.items import ITEMS, OURS, compute, results_of, settings_of, up_to_date
+from playground.evaluation.published.items import ITEMS, LGTOK, compute, results_of, settings_of, up_to_date
 from playground.evaluation.run import Order, evaluate
 from playground.evaluation.sweep import guidance_sweep
 from playground.motion.measures import foot_sliding
@@ -144,7 +144,7 @@ def test_only_what_changed_is_out_of_date(place: Place, found: dict[str, Result]
 
 
 def test_results_are_read_or_computed(place: Place, tmp_path: Path) -> None:
-    assert results_of("strips", folder=tmp_path) == dict.fromkeys(OURS)
+    assert results_of("strips", folder=tmp_path) == dict.fromkeys(LGTOK)
     given = {"engine": place[0], "library": place[1].path, "recompute": True}
     made = results_of("inference_time", ["lgtok", SYSTEM], motions=1, **given)
     assert made["lgtok"] is None and made[SYSTEM] is not None and made[SYSTEM].provenance["n"] == 1

@@ -40,6 +40,7 @@ ITEMS: dict[str, Item] = {
     )
 }
 OURS = tuple(name for name, row in SYSTEMS.items() if row.command == "train")
+LGTOK = tuple(name for name in OURS if SYSTEMS[name].family == "lgtok")
 
 
 def settings_of(system: str, library: Path) -> Settings:
@@ -104,11 +105,11 @@ def results_of(
 ) -> dict[str, Result | None]:
     """Results of an item by system, None where there is none: what the notebooks call.
 
-    recompute: compute now, for every system whose files are there, and keep nothing. systems: all of ours by default.
+    recompute: compute now, for every system whose files are there, and keep nothing. systems: LG-Tok's by default.
     changes: fields of Settings that are to be other than the default ones; None leaves the default.
     """
     item = item_of(name)
-    names = [row_of(system).name for system in (OURS if systems is None else systems)]
+    names = [row_of(system).name for system in (LGTOK if systems is None else systems)]
     if not recompute:
         return {system: read_result(name, system, folder) for system in names}
     engine = engine or default_engine()
