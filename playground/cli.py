@@ -164,7 +164,7 @@ def _for_models(command: Command) -> None:
 
 
 def _for_data(command: Command) -> None:
-    """prepare, segment, convert, train, evaluate, bench."""
+    """prepare, segment, snapmogen, convert, train, evaluate, bench."""
     sub = command("prepare", inputs.prepare, "published motion data to a library")
     sub.add_argument("source", metavar="SOURCE", help=SOURCES)
     sub.add_argument("root", metavar="ROOT", nargs="?", type=Path, help="the folder of the data; none for deepmimic")
@@ -175,6 +175,10 @@ def _for_data(command: Command) -> None:
     sub.add_argument("take", metavar="TAKE", type=Path, help="a .bvh, .npy or .npz file")
     sub.add_argument("--seed", type=int, default=0, help="of the draw (prepare uses 0)")
     sub.add_argument("--html", type=_output(".html"), metavar="OUT.html", help="the curve with its cuts as a page")
+
+    sub = command("snapmogen", inputs.snapmogen, "SnapMoGen's columns to BVH of its 24 joints, and back")
+    sub.add_argument("motion", metavar="MOTION", type=Path, help=".npy or .npz: 148 or 296 columns; .bvh: the rig")
+    sub.add_argument("--out", type=_output(".bvh", ".npz"), required=True, metavar="FILE")
 
     sub = command("convert", inputs.convert, "the files that other authors release to checkpoints")
     sub.add_argument("family", metavar="FAMILY", choices=("lgtok",), help="lgtok: the authors' release of LG-Tok")

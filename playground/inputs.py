@@ -56,6 +56,30 @@ def segment(take: Path, seed: int, html: Path | None) -> None:
         say(f"{html}: {len(found.spans)} parts, {len(found.minima)} minima")
 
 
+def snapmogen(motion: Path, out: Path) -> None:
+    """SnapMoGen's columns to a BVH file of its 24 joints, or such a BVH file to columns."""
+    import numpy as np
+
+    from playground.motion.bvh import read_bvh, write_source
+    from playground.motion.formats import read_snapmogen_rows
+    from playground.motion.snapmogen import FPS, to_features296
+
+    wanted = ".npz" if motion.suffix.lower() == ".bvh" else ".bvh"
+    if out.suffix.lower() != wanted:
+        raise PlaygroundError(f"{motion.name} becomes a {wanted} file; {out} should end in {wanted}")
+    if wanted == ".npz":
+        source = read_bvh(motion.read_bytes())
+        rows = to_features296(source)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        np.savez_compressed(out, features=rows, offsets=source.offsets.astype(np.float32), fps=np.float32(FPS))
+        say(f"{out}: {len(rows)} rows of {rows.shape[1]} columns")
+    else:
+        source = read_snapmogen_rows(motion)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(write_source(source), encoding="ascii", newline="\n")
+        say(f"{out}: {source.frames} poses of {len(source.names)} joints")
+
+
 def convert(
     family: str, tokenizer: Path, generator: Path, options: Path, out: Path, statistics: Path | None,
     llama: str | None, clip: str | None,

@@ -29,7 +29,7 @@ def test_there_is_a_python_example_and_commands() -> None:
     assert len(PYTHON) == 1
     assert {line.split()[0] for line in COMMANDS} == {
         "app", "systems", "tokenize", "decode", "generate", "prepare", "train", "evaluate", "bench",
-        "convert", "rewrite", "segment",
+        "convert", "rewrite", "segment", "snapmogen",
     }  # fmt: skip
 
 

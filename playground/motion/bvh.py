@@ -1,21 +1,29 @@
 """BVH: a reader that forgives what files in the wild do, and a writer that Blender opens.
 
-Written files: HUMAN22 names, metres, Y up, T-pose facing +Z, ROOT pelvis with 6 channels, every other joint with 3
-rotation channels (Z X Y), End Sites at head, hands and feet. Read files: any names, channels in any order, positions on
+Written files: ROOT with 6 channels, every other joint with 3 rotation channels (Z X Y), an End Site at every end; a
+Motion has HUMAN22 names, metres, Y up, a T-pose facing +Z. Read files: any names, channels in any order, positions on
 any joint (they replace the OFFSET, as Blender and Maya do), tabs, CRLF, comments, names with spaces.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
-from playground.motion.kinematics import CHILDREN, make_rigid, rotations_from_joints
+from playground.motion.kinematics import make_rigid, rotations_from_joints
 from playground.motion.motion import Motion
-from playground.motion.rotation import Array, axis_quaternion, matrix_to_euler, qmul, qrotate, quaternion_to_matrix
+from playground.motion.rotation import (
+    Array,
+    axis_quaternion,
+    matrix_to_euler,
+    qinv,
+    qmul,
+    qrotate,
+    quaternion_to_matrix,
+)
 from playground.motion.skeleton import HUMAN22
 from playground.motion.source import Source, check_size
 
@@ -224,7 +232,9 @@ def read_bvh(data: bytes) -> Source:
     return _source(tree, _read_values(text[timed.end() :], int(counted.group(1)), columns), fps)
 
 
-def _hierarchy_lines(offsets: Array) -> tuple[list[str], list[int]]:
+def _hierarchy_lines(
+    names: Sequence[str], parents: Sequence[int], offsets: Array, ends: Mapping[int, Sequence[float]]
+) -> tuple[list[str], list[int]]:
     """The HIERARCHY part and the joints in the order of their channels."""
     lines, order = ["HIERARCHY"], []
 
@@ -232,22 +242,30 @@ def _hierarchy_lines(offsets: Array) -> tuple[list[str], list[int]]:
         tabs = "\t" * depth
         order.append(joint)
         root = depth == 0
-        lines.append(f"{tabs}{'ROOT' if root else 'JOINT'} {HUMAN22.joints[joint]}")
+        lines.append(f"{tabs}{'ROOT' if root else 'JOINT'} {names[joint]}")
         lines.append(tabs + "{")
         lines.append(f"{tabs}\tOFFSET " + " ".join(f"{v:.6f}" for v in (np.zeros(3) if root else offsets[joint])))
         rotations = " ".join(f"{axis}rotation" for axis in ORDER)
         lines.append(
             f"{tabs}\tCHANNELS " + (f"6 Xposition Yposition Zposition {rotations}" if root else f"3 {rotations}")
         )
-        for child in CHILDREN[joint]:
+        for child in (c for c, parent in enumerate(parents) if parent == joint):
             joint_lines(child, depth + 1)
-        if joint in END_SITES:
-            end = " ".join(f"{v:.6f}" for v in END_SITES[joint])
+        if joint in ends:
+            end = " ".join(f"{v:.6f}" for v in ends[joint])
             lines.extend([f"{tabs}\tEnd Site", tabs + "\t{", f"{tabs}\t\tOFFSET {end}", tabs + "\t}"])
         lines.append(tabs + "}")
 
     joint_lines(0, 0)
     return lines, order
+
+
+def _motion_lines(root: Array, local: Array, order: list[int], fps: float) -> list[str]:
+    """The MOTION part: root positions [F, 3], local rotations [F, J, 4]."""
+    angles = np.degrees(np.unwrap(matrix_to_euler(quaternion_to_matrix(local), ORDER), axis=0))
+    values = np.concatenate([root, angles[:, order].reshape(len(root), -1)], axis=-1)
+    head = ["MOTION", f"Frames: {len(root)}", f"Frame Time: {1.0 / fps:.8f}"]
+    return head + [" ".join(f"{v:.6f}" for v in row) for row in values.tolist()]
 
 
 def write_bvh(motion: Motion) -> tuple[str, list[str]]:
@@ -258,10 +276,17 @@ def write_bvh(motion: Motion) -> tuple[str, list[str]]:
     if motion.skeleton.joints != HUMAN22.joints:
         raise PlaygroundError(f"only motions on {HUMAN22.name} can be written as BVH, not on {motion.skeleton.name}")
     rigid = make_rigid(motion.joints)
-    angles = matrix_to_euler(quaternion_to_matrix(rotations_from_joints(rigid.joints, rigid.offsets)), ORDER)
-    angles = np.degrees(np.unwrap(angles, axis=0))
-    lines, order = _hierarchy_lines(rigid.offsets)
-    lines += ["MOTION", f"Frames: {motion.frames}", f"Frame Time: {1.0 / motion.fps:.8f}"]
-    values = np.concatenate([rigid.joints[:, 0], angles[:, order].reshape(motion.frames, -1)], axis=-1)
-    lines += [" ".join(f"{v:.6f}" for v in row) for row in values.tolist()]
+    local = rotations_from_joints(rigid.joints, rigid.offsets)
+    lines, order = _hierarchy_lines(HUMAN22.joints, HUMAN22.parents, rigid.offsets, END_SITES)
+    lines += _motion_lines(rigid.joints[:, 0], local, order, motion.fps)
     return "\n".join(lines) + "\n", rigid.changes()
+
+
+def write_source(source: Source) -> str:
+    """Any skeleton in its own unit -> the text of a BVH file, from the root's path, the offsets and the rotations."""
+    local, parents = source.rotations.copy(), list(source.parents[1:])
+    local[:, 1:] = qmul(qinv(source.rotations[:, parents]), source.rotations[:, 1:])
+    closed = [joint for joint, kids in enumerate(source.children) if not kids]
+    ends = {joint: source.ends[joint].tolist() if joint in source.ends else [0.0] * 3 for joint in closed}
+    lines, order = _hierarchy_lines(source.names, source.parents, source.offsets, ends)
+    return "\n".join(lines + _motion_lines(source.positions[:, 0], local, order, source.fps)) + "\n"

@@ -5,10 +5,11 @@
 | .bvh | any two-legged skeleton | HUMAN22, metres, Y up |
 | .npz | joints [F, 22, 3] with fps, caption; AMASS-style joints, mocap_framerate; features | joints, fps, caption |
 | .npy | joints [F, 22, 3] or [F, 66]; 67 or 263 HumanML3D columns, not normalised; 20 fps | |
+| both | 296 SnapMoGen columns, or 148 with the rig's `offsets` [24, 3], not normalised; 30 fps | |
 | .glb | | animated body |
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ from playground.motion.representation import COLUMNS, from_features67
 from playground.motion.retarget import retarget
 from playground.motion.rotation import Array
 from playground.motion.skeleton import HUMAN22
+from playground.motion.snapmogen import COLUMNS as SNAPMOGEN
+from playground.motion.snapmogen import FPS as SNAPMOGEN_FPS
+from playground.motion.snapmogen import JOINTS as SNAPMOGEN_JOINTS
+from playground.motion.snapmogen import source_of
 from playground.motion.source import Source, check_size
 
 READ = (".bvh", ".npy", ".npz")
@@ -34,7 +39,7 @@ WRITTEN = (".npz", ".bvh", ".glb")
 JOINT_KEYS = ("joints", "jtr", "joints3d", "joint_positions", "positions", "keypoints3d", "features", "motion", "data")
 RATE_KEYS = ("fps", "mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "mocap_fps")
 POSE_KEYS = {"poses", "pose_body", "body_pose", "root_orient", "global_orient", "betas", "trans", "thetas"}
-FLAT = (3 * HUMAN22.size, COLUMNS, COLUMNS263)  # columns of a two-dimensional array: joints or features
+FLAT = (3 * HUMAN22.size, COLUMNS, COLUMNS263, *SNAPMOGEN)  # columns of a two-dimensional array: joints or features
 SMPL_JOINTS = (24, 52, 55, 73)  # SMPL, SMPL-H, SMPL-X without and with more: the first 22 are HUMAN22's
 MAX_SHARE_OF_DRIFT = 0.3  # standard deviation of a bone's length over its median, beyond which it is no bone
 
@@ -98,7 +103,7 @@ def _shape(header: Header) -> tuple[int, ...]:
 
 
 def _is_motion(header: Header) -> bool:
-    """Whether an array could be joints or features: [F, J, 3], [F, 66], [F, 67] or [F, 263]."""
+    """Whether an array could be joints or features: [F, J, 3] or [F, one of FLAT]."""
     shape = _shape(header)
     return (len(shape) == 3 and shape[2] == 3) or (len(shape) == 2 and shape[1] in FLAT)
 
@@ -126,7 +131,9 @@ def _pick(arrays: Arrays) -> str:
 def _check_shape(header: Header, fps: float) -> tuple[int, ...]:
     """The shape without a leading 1. PlaygroundError unless it is one of the accepted ones, before anything is read."""
     shape = _shape(header)
-    accepted = f"joints [frames, 22, 3] or {COLUMNS} or {COLUMNS263} HumanML3D columns are"
+    accepted = (
+        f"joints [frames, 22, 3], {COLUMNS} or {COLUMNS263} HumanML3D columns or {SNAPMOGEN[1]} SnapMoGen columns are"
+    )
     if header.dtype.kind not in "fiu":
         raise PlaygroundError(f"the array does not hold numbers; {accepted} accepted")
     if len(shape) == 3 and shape[2] == 3:
@@ -187,8 +194,41 @@ def _from_arrays(path: Path) -> tuple[Source, str, str, bool]:
     stated = _rate(arrays)
     fps = float(LIMITS.fps) if stated is None else stated
     shape = _check_shape(arrays.headers[name], fps)
+    if shape[1] in SNAPMOGEN:
+        source, sentence = _snapmogen(arrays, name, shape, stated)
+        return source, sentence, _caption(arrays), True
     joints, sentence = _joints_of(arrays.values(name).reshape(shape))
     return _source(joints, fps), sentence, _caption(arrays), len(shape) == 2 and shape[1] != 3 * HUMAN22.size
+
+
+def _snapmogen(arrays: Arrays, name: str, shape: tuple[int, ...], fps: float | None) -> tuple[Source, str]:
+    """An array of SnapMoGen's columns -> its source on 24 joints, and how it was understood."""
+    rows, offsets = arrays.values(name).reshape(shape).astype(np.float64), arrays.headers.get("offsets")
+    rig = None
+    if offsets is not None and offsets.shape == (SNAPMOGEN_JOINTS, 3) and offsets.dtype.kind == "f":
+        rig = arrays.values("offsets").astype(np.float64)
+    if rig is None and shape[1] == SNAPMOGEN[0]:
+        raise PlaygroundError(
+            f"{shape[1]} SnapMoGen columns need the rig: an npz file with them and 'offsets' [{SNAPMOGEN_JOINTS}, 3]"
+        )
+    if not np.isfinite(rows).all() or np.abs(rows).max() > 1e9 or (rig is not None and not np.isfinite(rig).all()):
+        raise PlaygroundError("the array holds NaN, infinite or huge values; every value must be a finite number")
+    source = source_of(rows, rig)
+    return replace(source, fps=fps or SNAPMOGEN_FPS), f"24 joints were recovered from {shape[1]} SnapMoGen columns."
+
+
+def read_snapmogen_rows(path: Path) -> Source:
+    """An .npy or .npz file of SnapMoGen's columns -> its source on 24 joints. PlaygroundError for anything else."""
+    _suffix(path, (".npy", ".npz"), "read as columns")
+    _check_file(path)
+    arrays = open_arrays(path)
+    name = _pick(arrays)
+    shape = _check_shape(arrays.headers[name], SNAPMOGEN_FPS)
+    if shape[1] not in SNAPMOGEN:
+        raise PlaygroundError(
+            f"the array has {shape[1]} columns; SnapMoGen's {SNAPMOGEN[0]} or {SNAPMOGEN[1]} are read"
+        )
+    return _snapmogen(arrays, name, shape, _rate(arrays))[0]
 
 
 def read_motion(path: str | Path, start_seconds: float = 0.0) -> ReadMotion:

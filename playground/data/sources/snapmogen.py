@@ -5,10 +5,9 @@
     all_caption_clean.json              clip id -> {"manual": [...], "gpt": [...]}
     data_split_info/SPLIT_ids.txt       clip ids SEQUENCE#start#end, rows of the sequence; SPLIT is train, val or test
 
-Columns: full yaw step, root velocity x and z in the frame of heading t, root height, 24 x 6 rotations against the world
-with the heading removed, 24 x 3 positions relative to the root's x, z and heading, velocities, contacts. A clip becomes
-22 joints in metres at 20 fps: the rig's offsets follow from positions and rotations, and the motion is retargeted
-(motion/retarget.py), scaled by leg length. Mirrored sequences (m_...) are in the lists.
+The columns are those of motion/snapmogen.py. A clip becomes 22 joints in metres at 20 fps: the rig's offsets follow
+from positions and rotations, and the motion is retargeted (motion/retarget.py), scaled by leg length. Mirrored
+sequences (m_...) are in the lists.
 """
 
 import json
@@ -24,28 +23,9 @@ from playground.data.sources.base import Reading, check_ids, folder, library_cli
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.bvh import read_bvh
-from playground.motion.rotation import (
-    Array,
-    matrix_to_quaternion,
-    qinv,
-    qmul,
-    qrotate,
-    sixd_to_matrix,
-    yaw_quaternion,
-)
-from playground.motion.source import Source
+from playground.motion.rotation import Array
+from playground.motion.snapmogen import COLUMNS, JOINTS, PARENTS, source_of
 
-FPS = 30.0
-NAMES = (
-    "root", "spine1", "spine2", "spine3", "neck", "neck2", "head", "l_collar", "l_shoulder", "l_elbow", "l_wrist",
-    "r_collar", "r_shoulder", "r_elbow", "r_wrist", "pelvis", "l_hip", "l_knee", "l_ankle", "l_foot", "r_hip", "r_knee",
-    "r_ankle", "r_foot",
-)  # fmt: skip
-PARENTS = (-1, 0, 1, 2, 3, 4, 5, 3, 7, 8, 9, 3, 11, 12, 13, 0, 15, 16, 17, 18, 15, 20, 21, 22)
-JOINTS = len(NAMES)
-ROTATIONS = slice(4, 4 + 6 * JOINTS)
-POSITIONS = slice(ROTATIONS.stop, ROTATIONS.stop + 3 * JOINTS)
-COLUMNS = (ROTATIONS.stop, POSITIONS.stop + 3 * JOINTS + 4)  # 148, 296
 NEEDED = ("renamed_feats", "data_split_info", "all_caption_clean.json")
 
 
@@ -130,30 +110,3 @@ def _rig(bvhs: Path) -> Array:
     if source.parents != PARENTS:
         raise PlaygroundError(f"{path} has another skeleton than SnapMoGen's {JOINTS} joints")
     return source.offsets
-
-
-def source_of(rows: Array, rig: Array | None = None) -> Source:
-    """Feature rows [F, 296], or [F, 148] with the rig's offsets [24, 3], -> a source at 30 fps.
-
-    The root's steps are turned back by the heading of the frame that they start from, as they were taken.
-    """
-    yaw = np.concatenate([[0.0], np.cumsum(rows[:-1, 0])])
-    back = yaw_quaternion(-yaw)
-    steps = np.zeros((len(rows), 3))
-    steps[1:, [0, 2]] = rows[:-1, 1:3]
-    steps[1:] = qrotate(back[:-1], steps[1:])
-    root = np.cumsum(steps, axis=0)
-    root[:, 1] = rows[:, 3]
-    sixd = rows[:, ROTATIONS].reshape(len(rows), JOINTS, 6)
-    turned = qmul(back[:, None], matrix_to_quaternion(sixd_to_matrix(sixd)))
-    parents = list(PARENTS[1:])
-    if rig is None or rows.shape[1] == COLUMNS[1]:
-        local = rows[:, POSITIONS].reshape(len(rows), JOINTS, 3)
-        joints = qrotate(back[:, None], local) + (root * np.array([1.0, 0.0, 1.0]))[:, None]
-        bones = qrotate(qinv(turned[:, parents]), joints[:, 1:] - joints[:, parents])
-        rig = np.concatenate([np.zeros((1, 3)), bones.mean(axis=0)])
-    else:
-        joints = np.repeat(root[:, None], JOINTS, axis=1)
-        for joint, parent in enumerate(parents, start=1):
-            joints[:, joint] = joints[:, parent] + qrotate(turned[:, parent], rig[joint])
-    return Source(NAMES, PARENTS, rig, joints, turned, FPS, {}, "SnapMoGen motion")
