@@ -18,7 +18,7 @@ from playground.runtime import Runtime
 from playground.systems import SamplingDefaults
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
-from playground.tokenizers.quantizers import resample_down
+from playground.tokenizers.grids import resample_down
 from playground.tokenizers.token_file import LevelTokens
 
 CHUNK = 24  # motions that are decoded together; the time left is looked at in between

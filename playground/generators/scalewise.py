@@ -24,7 +24,8 @@ from playground.nn.sampling import Sampling, draw, entropy_bits, guide
 from playground.nn.transfer import on_device
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Tokens
-from playground.tokenizers.quantizers import MultiScaleQuantizer, resample_down
+from playground.tokenizers.grids import resample_down
+from playground.tokenizers.quantizers import MultiScaleQuantizer
 from playground.tokenizers.transformer import FULL_SCALES, MID_SCALES, linear_codes
 
 

@@ -19,7 +19,6 @@ from playground.nn.modules import module_list
 from playground.tokenizers.affine import OUTER, Affine, Penalties, cross_covariance
 from playground.tokenizers.base import Quantized, Tokens
 from playground.tokenizers.grids import CountedGrid, FixedGrid, Grid
-from playground.tokenizers.grids import resample_down as resample_down
 
 PHIS = ("conv", "residual", "identity")
 METRICS = ("cosine", "euclidean")
