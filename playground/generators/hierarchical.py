@@ -208,7 +208,11 @@ class Sweep:
         if self.history[0].shape[1] >= self.window:
             self.history = [ids[:, -max(1, self.window - -(-self.window // 4)) :].clone() for ids in self.history]
         self.caches = [KeyValueCache() for _ in self.network.decoders]
-        self.network.prefill(self.slot, [self._both(ids) for ids in self.history], self.caches)
+        size = self.history[0].shape[1]
+        room = self.window - size if size else 0  # always the same shape: kernels for each would be kept for good
+        self.network.prefill(self.slot, [self._both(F.pad(ids, (0, room))) for ids in self.history], self.caches)
+        for cache in self.caches:
+            cache.cut(size + 1)
 
     def step(
         self,

@@ -29,6 +29,12 @@ class KeyValueCache:
         self.keys[layer], self.values[layer] = key, value
         return key, value
 
+    def cut(self, size: int) -> None:
+        """Keep the first `size` positions of every layer, in memory of their own."""
+        for table in (self.keys, self.values):
+            for layer, part in table.items():
+                table[layer] = part[:, :, :size].clone()
+
 
 @dataclass(frozen=True)
 class Memory:

@@ -66,9 +66,9 @@ def test_what_is_drawn_does_not_depend_on_how_much_is_asked_for_at_once(parts):
     assert stream.drawn == sum(parts)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
-    before=st.lists(st.tuples(st.integers(1, 9), st.integers(0, 2)), max_size=3),
+    before=st.lists(st.tuples(st.integers(1, 9), st.integers(0, 2)), max_size=2),
     carry=st.sampled_from([None, 0, 3, 99]),
 )
 def test_a_switch_leaves_earlier_tokens_untouched_and_is_repeatable(before, carry):
@@ -80,7 +80,7 @@ def test_a_switch_leaves_earlier_tokens_untouched_and_is_repeatable(before, carr
         parts.append(torch.stack(stream.next(4)))
         if switched:
             stream.switch(text_features((2,), seed=9), carry)
-        return torch.cat([*parts, torch.stack(stream.next(14))], dim=-1)
+        return torch.cat([*parts, torch.stack(stream.next(9))], dim=-1)
 
     plain, switched = run(False), run(True)
     count = sum(steps for steps, _ in before) + 4
