@@ -20,6 +20,7 @@ from playground.engine.checks import (
     whole,
 )
 from playground.engine.editing import EditRequest, benchmark_span, edit, edited_frames
+from playground.engine.endless import EndlessSession
 from playground.engine.generation import finish
 from playground.errors import PlaygroundError
 from playground.findings import (
@@ -164,6 +165,18 @@ class Engine(BaseEngine):
         (last,) = self.regenerate_steps(generation, scale, position, code, seed, deadline, previews=False)
         chosen = generation.seed if seed is None else seed
         return finish(self.runtime(generation.system), last, chosen, generation.sampling, began)
+
+    def endless(
+        self, prompt: str, system: str = "mogo", seed: int = 0, carry: int | None = None, **options: Any
+    ) -> EndlessSession:
+        """A motion without end: `session.advance(seconds)` goes on, `session.say(prompt)` changes the instruction.
+
+        carry: time steps of the past that stay in sight at a switch (None: all that are held). options: cfg,
+        temperature, top_k, top_p. PlaygroundError also for a system that cannot draw step by step.
+        """
+        how = settings(row_of(system), options)
+        check_sampling(seed, **vars(how))
+        return EndlessSession(self.runtime(system), prompt, seed, how, carry)
 
     # ---- editing ---------------------------------------------------------------------------------------------------
 

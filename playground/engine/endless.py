@@ -16,12 +16,14 @@ from playground.motion.representation import from_features67
 from playground.motion.stitch import Track, rows_yaw
 from playground.systems import SamplingDefaults
 from playground.text.prompts import normalise
+from playground.tokenizers.token_file import LevelTokens
 
 if TYPE_CHECKING:
     from playground.runtime import Runtime
 
 AROUND = LIMITS.fps // 2  # frames on either side of a switch that count as its seam
 BURST = 8  # time steps that are drawn and decoded together
+REMEMBERED = 2 * LIMITS.max_frames  # frames whose tokens can still be asked for
 
 Floats = NDArray[np.float32]
 
@@ -148,7 +150,14 @@ class EndlessSession:
         self._decoder = WindowDecoder(generator.tokenizer)
         self._trail, self._jerk = Trail(), _Jerk()
         self._spare = np.zeros((0, 22, 3), np.float32)  # poses that are made and not shown
+        self._ids: deque[NDArray[np.int64]] = deque(maxlen=REMEMBERED // self._decoder.unit)  # [N], the newest steps
+        self._given = 0  # steps that have gone to the decoder
         self._lock = threading.Lock()
+
+    @property
+    def drawn(self) -> int:
+        """Frames whose tokens are drawn; the next instruction begins there."""
+        return self._stream.drawn * self._decoder.unit
 
     @property
     def frames(self) -> int:
@@ -164,7 +173,7 @@ class EndlessSession:
         line = normalise(prompt)
         text = self.runtime.prompt(line)
         with self._lock:
-            frame = self._stream.drawn * self._decoder.unit
+            frame = self.drawn
             self._stream.switch(text, self.carry)
             self.prompt = line
             if frame:
@@ -184,12 +193,31 @@ class EndlessSession:
         with self._lock:
             while len(self._spare) < frames:
                 missing = -(-(frames - len(self._spare)) // self._decoder.unit)
-                rows = self._decoder.push(self._stream.next(min(missing, BURST), check))[0].numpy()
+                ids = self._stream.next(min(missing, BURST), check)
+                self._ids.extend(np.stack([level[0].numpy() for level in ids], axis=1))
+                self._given += ids[0].shape[1]
+                rows = self._decoder.push(ids)[0].numpy()
                 joints = self._trail.push(self.runtime.normaliser.invert(rows))
                 self._spare = np.concatenate([self._spare, joints])
             shown, self._spare = self._spare[:frames].copy(), self._spare[frames:].copy()
             self._jerk.push(shown)
             return Motion(shown, caption=self.prompt)
+
+    def levels(self, start: int, stop: int) -> tuple[LevelTokens, ...]:
+        """Every level's tokens of the frames start to stop, which are made: all that stand for some of them.
+
+        PlaygroundError for frames that are not made yet or were longer ago than REMEMBERED.
+        """
+        unit = self._decoder.unit
+        with self._lock:
+            oldest = self._given - len(self._ids)
+            first, last = start // unit, -(-stop // unit)
+            if not oldest <= first < last <= self._given:
+                held = f"{oldest * unit} to {self._given * unit}"
+                raise PlaygroundError(f"frames {start} to {stop} were asked for; tokens of frames {held} are held")
+            ids = np.stack([self._ids[step - oldest] for step in range(first, last)], axis=1)
+        codes = self._decoder.tokenizer.quantizer.codes
+        return tuple(LevelTokens(len(row), int(count), row) for row, count in zip(ids, codes, strict=True))
 
     def seams(self) -> Seams:
         """The jerk at the switches against the jerk elsewhere, of all that was shown."""
@@ -203,4 +231,5 @@ class EndlessSession:
     def held(self) -> int:
         """Bytes of the past that the session holds."""
         with self._lock:
-            return self._stream.held() + self._decoder.held() + self._spare.nbytes
+            ids = sum(step.nbytes for step in self._ids)
+            return self._stream.held() + self._decoder.held() + self._spare.nbytes + ids

@@ -170,3 +170,38 @@ def test_another_generator_and_an_empty_prompt_are_refused():
     with pytest.raises(PlaygroundError, match="empty"):
         one.say("")
     assert one.prompt == "a person walks"
+
+
+def test_the_tokens_of_frames_are_those_that_were_drawn_and_old_ones_are_let_go():
+    from playground.engine.endless import REMEMBERED
+    from playground.generators.streaming import Stream
+    from playground.nn.sampling import Sampling
+
+    one = session()
+    shown(one, 1.0, 0.55)
+    ids = Stream(runtime().generator, runtime().prompt("a person walks"), Sampling(seed=3, cfg=1.0, top_k=1.0)).next(12)
+    levels = one.levels(4, 31)
+    assert [level.codes for level in levels] == [10] * 3 and one.drawn >= 31
+    for level, row in zip(levels, ids, strict=True):
+        assert level.size == 7 and level.ids.tolist() == row[0, 1:8].tolist()
+    for start, stop in ((0, 0), (20, 400), (-8, 4)):
+        with pytest.raises(PlaygroundError, match="are held"):
+            one.levels(start, stop)
+    while one.frames < REMEMBERED + 40:
+        one.advance(4.0)
+    with pytest.raises(PlaygroundError, match="are held"):
+        one.levels(0, 8)
+    start = one.frames // 4 * 4 - 20
+    assert one.levels(start, start + 20)[0].size == 5
+
+
+def test_the_engine_opens_sessions_of_systems_that_can(monkeypatch):
+    from playground.engine import Engine
+
+    engine = Engine()
+    monkeypatch.setattr(engine, "runtime", lambda system: runtime())
+    one = engine.endless("a person walks", seed=3, cfg=1.0, top_k=1.0)
+    assert np.array_equal(one.advance(1.0).joints, session().advance(1.0).joints)
+    for wrong, why in (({"seed": -1}, "seed"), ({"cfg": 9.0}, "cfg"), ({"pace": 1}, "accepted")):
+        with pytest.raises(PlaygroundError, match=why):
+            engine.endless("a person walks", **wrong)
