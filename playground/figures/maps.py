@@ -87,9 +87,8 @@ def _groups(figure: go.Figure, cloud: Cloud, points: NDArray[np.float64], column
                 x=listed(points[own, 0]), y=listed(points[own, 1]), customdata=[cloud.ids[i] for i in own],
                 mode="markers", name=group, legendgroup=group, showlegend=column == 1,
                 hovertext=[cloud.notes[i] for i in own], hovertemplate="%{hovertext}<extra></extra>",
-                marker={"color": light, "symbol": symbol, "size": size, "opacity": 0.85,
-                        "line": {"width": 0.5, "color": "#ffffff"}},
-                meta={"dark": {"marker.color": dark, "marker.line.color": "#121518"}},
+                marker={"color": light, "symbol": symbol, "size": size, "opacity": 0.85, "line": {"width": 0}},
+                meta={"dark": {"marker.color": dark}},  # no outlines: they make painting four times as slow
             ),
             1,
             column,

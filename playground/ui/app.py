@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from playground.engine import Engine
 
 TITLE = "Motion Token Playground"
-SCRIPTS = ("page", "state", "export", "learn", "bar")  # the browser half of the page, inline in its head
+SCRIPTS = ("page", "state", "export", "learn", "preview", "bar")  # the browser half of the page, inline in its head
 UPLOADS_CHECKED_EVERY = 600  # seconds between looks for old uploaded files
 
 

@@ -2,7 +2,8 @@
  *
  * Plotly itself is served by the playground and loaded once, after the page stands. A trace may carry
  * meta.dark = {"marker.color": ...} with what changes in the dark; every other colour comes from the --mtp tokens.
- * A click on a point that has customdata triggers 'pick' and rings that point in every panel of the chart; the figure's
+ * A hover over a point that has customdata is told by 'mtp-hover' {id, x, y}, its end by one with id null.
+ * A click on such a point triggers 'pick' and rings that point in every panel of the chart; the figure's
  * layout.meta.picked names the point that is ringed at first; an event 'mtp-pick' {chart: element id, id} rings another.
  * An event 'mtp-lasso' {chart, group} lets a drag draw a group of that name ('' ends it): its points are outlined, and
  * 'lasso' is triggered with {group, ids}; with {chart, forget: true} the groups are gone.
@@ -117,6 +118,14 @@
           trigger('pick', { id: picked });
           redraw();
         });
+        const hover = (id, event) => box.dispatchEvent(new CustomEvent('mtp-hover', {
+          bubbles: true, detail: { id, x: event?.clientX ?? 0, y: event?.clientY ?? 0 },
+        }));
+        box.on('plotly_hover', ({ points, event }) => {
+          const hit = points.find((point) => point.customdata !== undefined && point.customdata !== null);
+          if (hit) hover(first(hit.customdata), event);
+        });
+        box.on('plotly_unhover', () => hover(null));
         box.on('plotly_selected', (event) => {
           const hits = (event?.points ?? []).filter(({ customdata }) => customdata !== undefined && customdata !== null);
           if (!group || !hits.length) return;

@@ -5,7 +5,7 @@ import html
 import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from playground.figures.theme import percent
 from playground.limits import LIMITS
 from playground.systems import row_of
 from playground.ui.facts import significant, table
+from playground.ui.tokencard import sentence
 
 if TYPE_CHECKING:
     from playground.findings import Placed
@@ -30,6 +31,7 @@ COLOURS = {
 UNITS = {"length": "length of the clip, s", "scale": "scale, coarse to fine", "time": "place in the clip, 0 to 1"}
 MAPS = [("t-SNE", "tsne"), ("PCA", "pca")]
 MOST_ROWS = 8  # actions that are listed apart
+TOKENS = 80  # tokens a scale that are drawn: every browser draws this many at once, also without a graphics card
 SAMPLE = 1500  # points of a group that distances are taken over
 HEIGHT = 420
 COLUMNS = ("system", "id", "scale", "position", "action", "source", "seconds", "tsne_x", "tsne_y", "pca_x", "pca_y")
@@ -52,6 +54,19 @@ class Shown:
         return self if self.colour in known else Shown(self.systems, self.each, "action", self.map)
 
 
+def drawn(bundle: Bundle, each: str) -> Bundle:
+    """The bundle as the maps show it: of tokens at most TOKENS a scale, spread evenly over those that are stored."""
+    if each == "clip":
+        return bundle
+    places = [np.flatnonzero(bundle.token_index[:, 1] == scale) for scale in range(1, len(bundle.sizes) + 1)]
+    kept = [own[np.linspace(0, len(own) - 1, min(len(own), TOKENS)).astype(int)] for own in places if len(own)]
+    rows = np.sort(np.concatenate(kept))
+    return replace(
+        bundle, token_index=bundle.token_index[rows], token_scores=bundle.token_scores[rows],
+        token_tsne=bundle.token_tsne[rows],
+    )  # fmt: skip
+
+
 def index_of(bundle: Bundle, each: str) -> NDArray[np.int64]:
     """(row, scale from 1, position) of every point [n, 3]; scale and position are 0 for clips."""
     if each == "token":
@@ -72,12 +87,6 @@ def vectors_of(bundle: Bundle, each: str) -> NDArray[np.float64]:
     return np.asarray(bundle.means if each == "clip" else bundle.token_scores, np.float64)
 
 
-def label_of(bundle: Bundle, row: int) -> str:
-    """A clip in a few words: our caption and where it was recorded."""
-    clip = bundle.clips[row]
-    return f"{clip.caption or clip.action} ({clip.source})"
-
-
 def colours_of(bundle: Bundle, shown: Shown) -> dict[str, Any]:
     """`groups` or `values` of a Cloud."""
     index = index_of(bundle, shown.each)
@@ -95,7 +104,7 @@ def colours_of(bundle: Bundle, shown: Shown) -> dict[str, Any]:
 def clouds(bundles: Sequence[Bundle], shown: Shown, placed: Mapping[str, "Placed"]) -> list[Cloud]:
     """The panels: both maps of one system, or one map of each of several."""
     made = []
-    for bundle in bundles:
+    for bundle in (drawn(one, shown.each) for one in bundles):
         index, colours = index_of(bundle, shown.each), colours_of(bundle, shown)
         notes = [_note(bundle, *place) for place in index]
         spots = placed.get(bundle.system)
@@ -124,9 +133,11 @@ def maps(
 def sample_of(bundles: Sequence[Bundle], each: str) -> str:
     """Sample size, split, data and seed in a line."""
     first = bundles[0]
-    count = len(first) if each == "clip" else len(first.token_index)
-    what = "clips" if each == "clip" else f"tokens, as many of each scale, of {len(first)} clips"
-    return f"{count:,} {first.split} {what} of {first.data}, seed {first.seed}, t-SNE perplexity {first.perplexity:g}"
+    shown, stored = len(drawn(first, each).token_index), len(first.token_index)
+    some = f"{shown:,}" if shown == stored else f"{shown:,} of {stored:,}"
+    what = f"{first.split} tokens, as many of each scale, of {len(first)} clips"
+    words = f"{len(first):,} {first.split} clips" if each == "clip" else f"{some} {what}"
+    return f"{words} of {first.data}, seed {first.seed}, t-SNE perplexity {first.perplexity:g}"
 
 
 def about(bundle: Bundle) -> str:
@@ -155,6 +166,7 @@ def coordinates(bundles: Sequence[Bundle], each: str) -> str:
 def compare(bundle: Bundle, each: str, first: Sequence[str], second: Sequence[str]) -> str:
     """Two groups of points by their ids as HTML: counts by action, mean distances. Without a second group the rest of
     the map stands for it."""
+    bundle = drawn(bundle, each)
     place = {id: n for n, id in enumerate(ids_of(bundle, each))}
     a = sorted({place[id] for id in first if id in place})
     if not a:
@@ -196,7 +208,7 @@ def mean_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> fl
 def _note(bundle: Bundle, row: int, scale: int, position: int) -> str:
     clip = bundle.clips[row]
     token = f"scale {scale}, token {position + 1} of {bundle.sizes[scale - 1]}, in: " if scale else ""
-    return f"{clip.action}<br>{token}{label_of(bundle, row)}, {clip.frames / LIMITS.fps:.1f} s"
+    return f"{clip.action}<br>{token}{sentence(bundle, row)}, {clip.frames / LIMITS.fps:.1f} s"
 
 
 def _title(bundle: Bundle, words: str, each: str) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 from playground.engine import default_engine
 from playground.errors import PlaygroundError
+from playground.ui.previews import write_previews
 from playground.ui.rooms import codebooks, compare, edit, embedding, generate, guidance, tokenize
 from playground.ui.services import Services
 from playground.ui.view import View
@@ -32,6 +33,8 @@ def write_openings(services: Services, names: Sequence[str] = ()) -> list[str]:
         for example in services.examples() if name in PRESETS else ():
             preset = PRESETS[name](services, example.id)
             preset.stored(services.fingerprint()).write(services.opening_path(f"{name}-{example.id}"))
+        if name == embedding.NAME:
+            write_previews(services)
     return chosen
 
 

@@ -93,13 +93,19 @@ def code_card(bundle: "Bundle", scale: int, code: int, like: "Neighbours | None"
     return f'<div class="mtp-token">{head}<p>{told}</p>{alike}{where}</div>'
 
 
+def sentence(bundle: "Bundle", row: int) -> str:
+    """A clip in a few words: our caption and where it was recorded."""
+    clip = bundle.clips[row]
+    return f"{clip.caption or clip.action} ({clip.source})"
+
+
 def _place(bundle: "Bundle", row: int, scale: int, position: int) -> str:
     clip = bundle.clips[row]
     step = clip.frames / bundle.sizes[scale - 1] / LIMITS.fps
     when = f"{position * step:.1f} to {(position + 1) * step:.1f} s"
     words = {"room": "embedding-map", "system": bundle.system, "motion": clip.id}
     query = urlencode({**words, "selection": f"{bundle.system}.{scale}.{position}"})
-    name = html.escape(f"{clip.caption or clip.action} ({clip.source})")
+    name = html.escape(sentence(bundle, row))
     return f'<a data-state href="?{html.escape(query, quote=True)}">{name}</a> <span>{when}</span>'
 
 

@@ -61,6 +61,29 @@ def test_a_click_on_a_curve_shows_what_the_code_stands_for(seen: Visit) -> None:
     expect(page.locator("#codebooks-card")).to_contain_text("scale 5")
 
 
+def test_a_hovered_point_plays_its_clip_small(seen: Visit) -> None:
+    page = seen.enter("Embedding map")
+    points = page.locator("#embedding-map .scatterlayer .trace .point")
+    expect(points).to_have_count(182)
+    seen.settle()
+    card = page.locator(".mtp-preview")
+    expect(card).to_be_hidden()
+    mark = len(seen.requests)
+    points.nth(3).hover(force=True)
+    expect(card).to_be_visible()
+    expect(card.locator("figcaption")).to_contain_text("a person does")
+    drawn = "(box) => box.getContext('2d').getImageData(0, 0, 132, 132).data.some(Boolean)"
+    assert card.locator("canvas").evaluate(drawn)
+    first = card.get_attribute("data-clip")
+    page.mouse.move(5, 5)
+    expect(card).to_be_hidden()
+    asked = len(seen.sent_since(mark))
+    points.nth(12).hover(force=True)
+    expect(card).to_be_visible()
+    assert card.get_attribute("data-clip") != first and len(seen.sent_since(mark)) == asked  # a hover asks nobody
+    assert seen.complaints == []
+
+
 def test_maps_of_tokens_by_scale(seen: Visit) -> None:
     page = seen.enter("Embedding map")
     points = page.locator("#embedding-map .scatterlayer .trace .point")

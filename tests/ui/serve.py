@@ -5,6 +5,8 @@ import time
 
 from playground.analysis.results import write_result
 from playground.ui.app import launch
+from playground.ui.previews import write_previews
+from playground.ui.services import Services
 from tests.figures.test_sweep import swept
 from tests.ui.double import FakeEngine
 
@@ -14,6 +16,7 @@ def main() -> None:
     port, pause = int(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
     engine = FakeEngine(pause=lambda: time.sleep(pause))
     write_result(swept(), engine.assets / "results")
+    write_previews(Services(lambda: engine))  # type: ignore[arg-type, return-value]
     launch(port=port, engine=lambda: engine)
 
 

@@ -154,3 +154,17 @@ def test_a_link_places_what_a_prompt_makes(do: embedding.Handlers) -> None:
 def test_a_link_with_somebody_elses_file_says_so(do: embedding.Handlers) -> None:
     shown = do.arrive(None, event(query="?room=embedding-map&place=file%3Amy+walk.npz"))
     assert shown[3].guest is None and "my walk.npz" in shown[8].text
+
+
+def test_of_many_tokens_as_many_of_each_scale_are_drawn(bundle: Bundle, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mapping, "TOKENS", 7)
+    some = mapping.drawn(bundle, "token")
+    assert np.bincount(some.token_index[:, 1])[1:].tolist() == [7] * len(SIZES)
+    rows = {tuple(row): n for n, row in enumerate(bundle.token_index.tolist())}
+    for place, index in zip(some.token_tsne, some.token_index.tolist(), strict=True):
+        assert np.array_equal(place, bundle.token_tsne[rows[tuple(index)]])
+    assert mapping.drawn(bundle, "clip") is bundle
+    assert mapping.sample_of([bundle], "token").startswith("70 of 200 test tokens")
+    text = mapping.compare(bundle, "token", mapping.ids_of(some, "token")[:10], [])
+    assert "<td>10</td><td>60</td>" in text
+    assert len(mapping.coordinates([bundle], "token").splitlines()) == 1 + len(bundle.token_index)

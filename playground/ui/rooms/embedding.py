@@ -17,17 +17,20 @@ from playground.ui.errors import Noted, attach
 from playground.ui.facts import Fact
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
-from playground.ui.mapping import COLOURS, Shown, about, compare, coordinates, label_of, maps
+from playground.ui.mapping import COLOURS, Shown, about, compare, coordinates, maps
 from playground.ui.mapviews import FORGET, FREE, KEEP_GROUP, RING, SAVE, SELECT, Views, panel_views
 from playground.ui.placing import Guest, generated_guest, guest_of, guest_scene
+from playground.ui.previews import preview_card
 from playground.ui.scenes import score, token_facts
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE
+from playground.ui.tokencard import sentence
 from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
 
 NAME = "embedding-map"
 STAGE = "embedding"
+STAGE_MAP = "embedding-map"  # the chart's element
 LEAD = "Each point is a recorded motion, placed by what its tokens mean. Click one: do neighbours move alike?"
 NEIGHBOURS = 4
 DOING, PLACING = "Decoding its tokens", "Placing it"
@@ -74,7 +77,7 @@ def show(services: Services, systems: Sequence[str], wanted: str) -> View:
             continue
         row = bundle.position(wanted)
         decoded, levels = services.engine().decode(bundle.token_file(row)), bundle.levels(row)
-        label = label_of(bundle, row)
+        label = sentence(bundle, row)
         title = label[:1].upper() + label[1:] if not figures else infos[name].title
         figures.append(scene.figure(f"clip-{name}", title, decoded.motion.joints, name, DECODED_NOTE))
         tracks.append(score(infos[name], decoded.motion.frames, levels, services.palettes(name)))
@@ -229,6 +232,7 @@ def room(services: Services) -> None:
             views = panel_views(services, map_systems(services), opening, NEAR)
         words(NAME)
         door = link_door(NAME)
+        preview_card(services, STAGE_MAP)
     _bind(Handlers(services), views, session, stage, door)
 
 
