@@ -309,7 +309,7 @@ class MultiScaleQuantizer(nn.Module):
         residual, total = z.detach(), torch.zeros_like(z)
         ids: list[Tensor] = []
         commitment = z.new_zeros(())
-        fed: list[tuple[Tensor, Tensor]] = []  # what a shared codebook learns from
+        fed: list[Tensor] = []  # what a shared codebook learns from
         noise = self.draw if self.training else 0.0
         for level in range(self._levels_used()):
             book, real = self.codebooks[level], grid.real(level)
@@ -317,7 +317,7 @@ class MultiScaleQuantizer(nn.Module):
             ids.append(_choose(book, pooled, real, noise))
             share = self._share(level, ids[-1], grid)
             if self.training and self.shared:
-                fed.append((_real(pooled, real), _real(ids[-1], real)))
+                fed.append(pooled)
             elif self.training:
                 flat = _real(self._sought(level, residual), grid.real(None))
                 book.learn(flat, _real(ids[-1], real) if grid.whole(level) else book.lookup(flat, noise))
@@ -329,11 +329,17 @@ class MultiScaleQuantizer(nn.Module):
                 total = total + share
             residual = residual - share.detach()
         if fed:
-            vectors, chosen = (torch.cat(parts) for parts in zip(*fed, strict=True))
-            self.codebooks[0].learn(vectors, chosen)
+            self._learn_together(fed, ids, grid)
         # with affine levels the value's own gradient reaches W and b
         straight = total + (z - z.detach()) if self.affines else z + (total - z).detach()
         return TrainingQuantized(straight, commitment if self.penalties else commitment / len(ids), tuple(ids))
+
+    def _learn_together(self, vectors: Sequence[Tensor], ids: Sequence[Tensor], grid: Grid) -> None:
+        """One EMA step of the shared codebook on [B, s_n, D] of every level; motion by motion, so that codes restart
+        from all levels."""
+        masks = [grid.real(level) for level in range(len(ids))]
+        real = None if masks[0] is None else torch.cat([mask for mask in masks if mask is not None], dim=1)
+        self.codebooks[0].learn(_real(torch.cat(list(vectors), dim=1), real), _real(torch.cat(list(ids), dim=1), real))
 
     def _penalty(self, weights: Penalties, level: int, before: Tensor, share: Tensor, grid: Grid) -> Tensor:
         """C1's terms of one level, divided by OUTER so that a trainer's weight gives them theirs; scalar.
