@@ -14,7 +14,10 @@ from playground.motion.representation import from_features67
 from playground.text.prompts import normalise
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from playground.runtime import Runtime
+    from playground.text.features import TextFeatures
 
 UNIT = 4  # rows: clips are floored to a multiple of it (systems.md A2)
 BATCH = 32
@@ -32,6 +35,18 @@ class ClipPass:
     mean_embedding: Floats  # [D], z_hat averaged over the motion's own latents
     energy: Floats  # [N+1], share of the latent's energy left after 0..N scales
     errors_mm: Floats  # [rows], pelvis-relative error of each frame (F2)
+
+
+@dataclass(frozen=True, eq=False)
+class ClipBatch:
+    """Clips of one batch, cut and ready for the tokenizer."""
+
+    indices: list[int]  # clips of the library
+    rows: list[int]  # feature rows of each
+    given: list[NDArray[np.float32]]  # un-normalised rows [rows, C] of each
+    features: "Tensor"  # [B, F, C] normalised, 0 beyond each clip's rows
+    lengths: "Tensor"  # int64 [B]
+    text: "TextFeatures | None"
 
 
 def rows_of(frames: int) -> int:
@@ -59,14 +74,23 @@ def clip_passes(
     indices: clips of the library; captions: one each, "" for none. Clips of similar length run together, so results do
     not come in the order of `indices`; each says which clip it is. Of longer clips the first 196 rows are measured.
     """
+    work = sum(rows_of(library.clips[i].frames) > 0 for i in indices)
+    done = 0
+    for group in clip_batches(runtime, library, indices, captions, batch=batch):
+        yield from _one_batch(runtime, group)
+        done += len(group.rows)
+        if progress:
+            progress(done, work)
+
+
+def clip_batches(
+    runtime: "Runtime", library: Library, indices: Sequence[int], captions: Sequence[str], *, batch: int = BATCH
+) -> Iterator[ClipBatch]:
+    """The batches that `clip_passes` runs over; arguments as there."""
     work = [(rows_of(library.clips[i].frames), i, text) for i, text in zip(indices, captions, strict=True)]
     work = sorted((entry for entry in work if entry[0]), key=lambda entry: (not entry[2], entry[0], entry[1]))
-    done = 0
     for group in _groups(work, batch):
-        yield from _one_batch(runtime, library, group)
-        done += len(group)
-        if progress:
-            progress(done, len(work))
+        yield _clip_batch(runtime, library, group)
 
 
 def _groups(work: list[tuple[int, int, str]], batch: int) -> Iterator[list[tuple[int, int, str]]]:
@@ -76,21 +100,26 @@ def _groups(work: list[tuple[int, int, str]], batch: int) -> Iterator[list[tuple
         yield from (part[start : start + batch] for start in range(0, len(part), batch))
 
 
-def _one_batch(runtime: "Runtime", library: Library, group: list[tuple[int, int, str]]) -> Iterator[ClipPass]:
+def _clip_batch(runtime: "Runtime", library: Library, group: list[tuple[int, int, str]]) -> ClipBatch:
     import torch
 
-    tokenizer, rule = runtime.tokenizer, runtime.heading
-    features = [library.features(index, rule)[:rows] for rows, index, _ in group]
+    rule = runtime.heading
+    given = [library.features(index, rule)[:rows] for rows, index, _ in group]
     lengths = torch.tensor([rows for rows, _, _ in group])
-    padded = torch.zeros(len(group), int(lengths.max()), features[0].shape[1])
-    for line, values in enumerate(features):
+    padded = torch.zeros(len(group), int(lengths.max()), given[0].shape[1])
+    for line, values in enumerate(given):
         padded[line, : len(values)] = torch.from_numpy(runtime.normaliser.apply(values))
     text = runtime.encoder.encode([caption for _, _, caption in group]) if group[0][2] else None
-    quantized = tokenizer.encode(padded, lengths, text)
-    decoded = tokenizer.decode(quantized.embedding, lengths, text).numpy()
+    return ClipBatch([index for _, index, _ in group], [rows for rows, _, _ in group], given, padded, lengths, text)
+
+
+def _one_batch(runtime: "Runtime", group: ClipBatch) -> Iterator[ClipPass]:
+    tokenizer = runtime.tokenizer
+    quantized = tokenizer.encode(group.features, group.lengths, group.text)
+    decoded = tokenizer.decode(quantized.embedding, group.lengths, group.text).numpy()
     norm = quantized.residual_norm.double().numpy()  # (N + 1, B)
     energy = norm / np.maximum(norm[0], 1e-12)
-    for line, (rows, index, _) in enumerate(group):
+    for line, (index, rows, given) in enumerate(zip(group.indices, group.rows, group.given, strict=True)):
         rebuilt, sizes = from_features67(runtime.normaliser.invert(decoded[line, :rows])), tokenizer.sizes(rows)
         yield ClipPass(
             index=index,
@@ -98,5 +127,5 @@ def _one_batch(runtime: "Runtime", library: Library, group: list[tuple[int, int,
             ids=tuple(i[line, :size].numpy() for i, size in zip(quantized.tokens.ids, sizes, strict=True)),
             mean_embedding=quantized.embedding[line, : sizes[-1]].double().mean(dim=0).numpy(),
             energy=energy[:, line],
-            errors_mm=joint_errors(from_features67(features[line]), rebuilt),
+            errors_mm=joint_errors(from_features67(given), rebuilt),
         )
