@@ -25,10 +25,10 @@ SIZE ?= cpu
 MINUTES ?=
 QUEUE = --library $(LIBRARY) --size $(SIZE) $(if $(MINUTES),--minutes $(MINUTES))
 
-.PHONY: help setup app test notebooks figures train family others ablations bench lint format screenshots clean
+.PHONY: help setup app test notebooks figures train family others ablations ablations-others bench lint format screenshots clean
 
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 24
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 24
 
 setup: $(DEV) $(SYSTEM) ## install everything: run-time and dev requirements, a browser and off-screen GL for the tests
 
@@ -70,6 +70,9 @@ others: $(DEV) $(LIBRARY)/library.json ## train the other papers' systems, what 
 
 ablations: $(DEV) $(LIBRARY)/library.json ## train and measure the ablations, one after another (SIZE, MINUTES); stops and goes on at will
 	$(BIN)/python -m playground.training.ablations $(QUEUE)
+
+ablations-others: $(DEV) $(LIBRARY)/library.json ## the same for the other papers' systems (MINUTES); stops and goes on at will
+	$(BIN)/python -m playground.training.ablations_others --library $(LIBRARY) $(if $(MINUTES),--minutes $(MINUTES))
 
 bench: $(RUNTIME) ## measure speed and memory
 	$(BIN)/python -m playground bench

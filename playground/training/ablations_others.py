@@ -1,0 +1,261 @@
+"""Small ablations of the other papers' systems: `python -m playground.training.ablations_others` is their queue.
+
+MOGO's Tables 1, 3 and 4 and its levels, SnapMoGen's figure on layers, its Table 4 and Fig 5. Every row is one training
+with the same seed, steps, batches and clips as its base; what differs is what its name says. The held-out rows are
+trained on the library without one source, normaliser included, and measured on all clips of that source.
+
+The queue can be killed at any point. After every run it is measured, and the results are written whole; rows that are
+not trained say so.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from playground.data.library import SPLITS, Library, LibraryClip, write_library
+from playground.engine import ASSETS
+from playground.evaluation.evaluators import Evaluator, evaluator_path, load_evaluator
+from playground.evaluation.trained import measure_generated, measure_rebuilt
+from playground.systems import SYSTEMS
+from playground.training.ablations import CLIPS, NOT_TRAINED, write_json
+from playground.training.configs import GeneratorTraining, TokenizerTraining
+from playground.training.others import OTHERS
+from playground.training.queue import Job, add_arguments, chosen, guarded, limits_of, run_queue, say, status
+from playground.training.run import tokenizer_of
+
+STEPS, DRAWN_STEPS = 1_200, 1_500  # of a tokenizer, of a generator
+WIDTH = 96  # of the convolutions
+SPLIT, SEED, REPEATS = "test", 0, 3
+HELD_OUT = "HDM05"  # the source that the held-out rows have not seen
+SIZES = ("small", "middle", "large")  # of Fig 5: width, feed-forward, layers, heads
+_SHAPES = {"small": (96, 256, 3, 3), "middle": (192, 512, 5, 3), "large": (320, 1024, 8, 5)}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of one table. A training that stands in several tables has one name and is run once."""
+
+    table: str
+    label: str  # as the cited table has it, where there is one
+    name: str  # of the run
+    split: str = SPLIT  # what it is measured on: a split, or a source that is held out
+
+
+MOGO, SNAP = "mogo-base", "snap-base"
+ROWS: tuple[Row, ...] = (
+    *(Row("mogo3", f"{n} level{'s' * (n > 1)}", MOGO if n == 6 else f"mogo-{n}") for n in (1, 3, 6, 7)),
+    Row("mogo-levels", "affine and decorrelation", MOGO),
+    Row("mogo-levels", "decorrelation alone", "mogo-rigid"),
+    Row("mogo-levels", "affine alone", "mogo-correlated"),
+    Row("mogo-levels", "neither", "mogo-plain"),
+    Row("mogo4", "shrinking: 4, 2, 1, 1, 1, 1 layers", "mogo-shrinking"),
+    Row("mogo4", "uniform: 2 layers each", "mogo-uniform"),
+    Row("mogo4", "growing: 1, 1, 1, 1, 2, 4 layers", "mogo-growing"),
+    *(
+        Row("mogo1", title, f"{system}-heldout{part}", HELD_OUT)
+        for system, title in (("mogo", "MOGO"), ("momask", "MoMask"), ("t2mgpt", "T2M-GPT"))
+        for part in ("", "-generator")
+    ),
+    Row("snap-layers", "4 scales, one shared codebook", SNAP),
+    Row("snap-layers", "5 scales, one shared codebook", "snap-5"),
+    Row("snap-layers", "6 same-scale levels, a codebook each", "snap-same"),
+    Row("snap4", "base", SNAP),
+    Row("snap4", "half the codes", "snap-half"),
+    Row("snap4", "a quarter of the codes", "snap-quarter"),
+    *(Row("snap4", f"{n} scale{'s' * (n > 1)}", f"snap-{n}") for n in (1, 2, 3, 5)),
+    Row("snap4", "full-scale levels", "snap-full"),
+    Row("snap4", "no attention", "snap-no-attention"),
+    Row("snap4-drawn", "in-context", "snap-in-context"),
+    Row("snap4-drawn", "cross-attention", "snap-cross-middle"),
+    Row("snap5", "in-context", "snap-in-context"),
+    *(Row("snap5", f"cross-attention, {size}", f"snap-cross-{size}") for size in SIZES),
+)
+
+
+# ---- trainings ------------------------------------------------------------------------------------------------------
+
+
+def _tokenizer(name: str, **changes: Any) -> TokenizerTraining:
+    """A system's tokenizer at the size of these ablations, with other numbers in its config."""
+    known = OTHERS[f"{name}-tokenizer"]
+    assert isinstance(known, TokenizerTraining)
+    model = replace(known.model, **({"width": WIDTH} | changes))
+    batch, schedule = replace(known.batch, size=16), replace(known.schedule, steps=STEPS)
+    return replace(known, model=model, batch=batch, schedule=schedule, clips=CLIPS)
+
+
+def _generator(name: str, tokenizer: str, **changes: Any) -> GeneratorTraining:
+    """A system's generator on the tokens of a tokenizer of this table."""
+    known = OTHERS[f"{name}-generator"]
+    assert isinstance(known, GeneratorTraining)
+    model = replace(known.model, **changes)
+    schedule = replace(known.schedule, steps=DRAWN_STEPS, validate_every=150)
+    return replace(known, model=model, schedule=schedule, tokenizer=f"{tokenizer}-tokenizer", lent=True)
+
+
+def trainings() -> dict[str, TokenizerTraining | GeneratorTraining]:
+    """Every training of the table by name, tokenizers before the generators that draw from them."""
+    found: dict[str, TokenizerTraining | GeneratorTraining] = {MOGO: _tokenizer("mogo")}
+    codes = found[MOGO].model.codes[0]
+    for n in (1, 3, 7):
+        found[f"mogo-{n}"] = _tokenizer("mogo", divisors=(1,) * n, codes=(codes,) * n)
+    found["mogo-rigid"] = _tokenizer("mogo", affine=False)
+    found["mogo-correlated"] = _tokenizer("mogo", decorrelation=0.0)
+    found["mogo-plain"] = _tokenizer("mogo", affine=False, decorrelation=0.0)
+    layouts = {"shrinking": (4, 2, 1, 1, 1, 1), "uniform": (2,) * 6, "growing": (1, 1, 1, 1, 2, 4)}
+    for layout, depths in layouts.items():
+        found[f"mogo-{layout}"] = _generator("mogo", MOGO, depths=depths, heads=(4,) * 6)
+    found |= _snap()
+    for system in ("mogo", "momask", "t2mgpt"):
+        found[f"{system}-heldout"] = replace(_tokenizer(system), clips=0)
+        found[f"{system}-heldout-generator"] = _generator(system, f"{system}-heldout")
+    return found
+
+
+def _snap() -> dict[str, TokenizerTraining | GeneratorTraining]:
+    """MoMask++'s."""
+
+    def scaled(divisors: tuple[int, ...], **changes: Any) -> TokenizerTraining:
+        return _tokenizer("momaskpp", divisors=divisors, codes=(codes,) * len(divisors), **changes)
+
+    base = _tokenizer("momaskpp")
+    codes, divisors = base.model.codes[0], base.model.divisors
+    found: dict[str, TokenizerTraining | GeneratorTraining] = {SNAP: base}
+    found["snap-half"] = _tokenizer("momaskpp", codes=(codes // 2,) * len(divisors))
+    found["snap-quarter"] = _tokenizer("momaskpp", codes=(codes // 4,) * len(divisors))
+    found |= {f"snap-{len(kept)}": scaled(kept) for kept in (divisors[3:], divisors[2:], divisors[1:])}
+    found["snap-5"] = scaled((2 * divisors[0], *divisors))
+    found["snap-full"] = scaled((1,) * len(divisors))
+    found["snap-no-attention"] = _tokenizer("momaskpp", attention="none")
+    found["snap-same"] = _tokenizer("momask")
+    found["snap-in-context"] = _generator("momaskpp", SNAP)
+    for size in SIZES:
+        width, hidden, depth, heads = _SHAPES[size]
+        shape = {"width": width, "hidden": hidden, "depth": depth, "heads": heads}
+        found[f"snap-cross-{size}"] = _generator("momaskpp-cross", SNAP, **shape)
+    return found
+
+
+def system_of(name: str) -> str:
+    """The system of the table whose sampling a run uses."""
+    return {"snap": "momaskpp"}.get(name.split("-")[0], name.split("-")[0])
+
+
+def held_out(name: str) -> bool:
+    """Whether a run is trained without the held-out source."""
+    return "-heldout" in name
+
+
+def ablation_jobs(out: Path) -> list[Job]:
+    """Every training of the table. A held-out system's tokenizer and generator lie side by side, as all do."""
+    return [Job(name, training, out / name, {"run": f"ablation {name}"}) for name, training in trainings().items()]
+
+
+def library_without(library: Library, source: str, folder: Path) -> Path:
+    """A copy of a library without the clips of one source; made once. PlaygroundError if nothing is left."""
+    if not (folder / "library.json").is_file():
+        kept = (index for index, clip in enumerate(library.clips) if clip.source != source)
+        clips = (
+            LibraryClip(clip.id, clip.source, clip.split, clip.action, clip.captions, library.joints(index))
+            for index in kept
+            for clip in (library.clips[index],)
+        )
+        write_library(folder, clips, f"{library.name} without {source}")
+    return folder
+
+
+# ---- results --------------------------------------------------------------------------------------------------------
+
+
+def measured(job: Job, library: Library, evaluator: Evaluator | None) -> dict[str, Any] | None:
+    """What a finished job measures; None for another one. Kept beside its checkpoint until either file changes."""
+    if not job.done:
+        return None
+    source = HELD_OUT if held_out(job.name) else None
+    kept = job.out / f"measured-{job.checkpoint.parent.name}.json"
+    settings: dict[str, Any] = {"data": library.name, "split": SPLIT, "source": source, "seed": SEED}
+    settings |= {"repeats": REPEATS, "evaluator": evaluator.hash[:12] if evaluator else None}
+    settings["changed"] = job.checkpoint.stat().st_mtime_ns
+    if kept.is_file():
+        found: dict[str, Any] = json.loads(kept.read_text())
+        if found["settings"] == settings:
+            return dict(found["figures"])
+    splits = SPLITS if source else (SPLIT,)
+    clips = [index for split in splits for index in library.split(split)]
+    clips = [index for index in clips if source in (None, library.clips[index].source)]
+    if isinstance(job.training, GeneratorTraining):
+        tokenizer, sampling = tokenizer_of(job.training, job.out), SYSTEMS[system_of(job.name)].sampling
+        figures = measure_generated(
+            tokenizer, job.checkpoint, job.name, library, clips, evaluator, sampling, repeats=REPEATS, seed=SEED
+        )
+        figures["validation"] = job.facts().get("validation", [])
+    else:
+        figures = measure_rebuilt(job.checkpoint, job.name, library, clips, evaluator, repeats=REPEATS, seed=SEED)
+    write_json(kept, {"settings": settings, "figures": figures})
+    return figures
+
+
+def results(jobs: Sequence[Job], library: Library, evaluator: Evaluator | None) -> dict[str, Any]:
+    """The stored result: every row of every table with its figures, or with the status "not trained yet"."""
+    by_name = {job.name: job for job in jobs}
+    figures = {job.name: measured(job, library, evaluator) for job in jobs}
+    rows = []
+    for row in ROWS:
+        found = figures.get(row.name)
+        facts = by_name[row.name].facts() if found else {}
+        trained = {"status": "trained", "step": facts.get("step"), "seconds": round(facts.get("seconds", 0.0))}
+        head = {"table": row.table, "label": row.label, "run": row.name, "measured_on": row.split}
+        rows.append(head | (trained | found if found else {"status": NOT_TRAINED}))
+    provenance = {
+        "system": "small ablations of the other systems", "data": library.name, "split": SPLIT, "seed": SEED,
+        "steps": STEPS, "drawn_steps": DRAWN_STEPS, "training_clips": CLIPS, "repeats": REPEATS, "held_out": HELD_OUT,
+        "training_seed": 0, "evaluator": evaluator.hash[:12] if evaluator else None,
+    }  # fmt: skip
+    return {"item": "ablations_others", "made_by": "make ablations-others", "provenance": provenance, "rows": rows}
+
+
+def measure_again(library: Path, out: Path = Path("runs/ablations-others")) -> dict[str, Any]:
+    """What `results` gives for the trainings that are finished under `out`; nothing is trained, nothing is stored."""
+    evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
+    return results(ablation_jobs(out), Library.open(library), evaluator)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command; returns its exit status."""
+    about = "Train and measure the other systems' ablations, one after another; call it again to go on."
+    parser = argparse.ArgumentParser(prog="python -m playground.training.ablations_others", description=about)
+    add_arguments(parser, "runs/ablations-others", sizes=())
+    stored = ASSETS / "results" / "ablations_others.json"
+    parser.add_argument("--results", type=Path, default=stored, metavar="FILE", help="where the figures are written")
+    options = parser.parse_args(arguments)
+
+    def run() -> None:
+        jobs = ablation_jobs(options.out)
+        wanted = chosen(jobs, options.only)
+        if options.list:
+            say("\n".join(status(wanted)))
+            return
+        limits, library = limits_of(options), Library.open(options.library)
+        evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
+
+        def after(job: Job) -> None:
+            write_json(options.results, results(jobs, library, evaluator))
+
+        after(wanted[0])
+        seen = [job for job in wanted if not held_out(job.name)]
+        unseen = [job for job in wanted if held_out(job.name)]
+        done = run_queue(seen, limits, say, after)
+        if unseen and not limits.passed:
+            folder = library_without(library, HELD_OUT, options.out / f"library-without-{HELD_OUT}")
+            done = run_queue(unseen, replace(limits, library=folder), say, after) and done
+        say(f"{options.results}: {'all rows that were asked for' if done else 'the rows trained so far'}")
+
+    return guarded(run)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
