@@ -6,6 +6,7 @@ from typing import Any
 from playground.data.batches import BatchConfig
 from playground.errors import PlaygroundError
 from playground.evaluation.networks import EvaluatorConfig
+from playground.generators.refiner import RefinerConfig
 from playground.generators.scalewise import GENERATOR_PRESETS
 from playground.tokenizers.transformer import PRESETS
 
@@ -125,6 +126,31 @@ REFITS: dict[str, RefitTraining] = {
         tokenizer_training=TOKENIZERS["lgtok-lite-tokenizer"],
         batch=BatchConfig(size=32, whole=0.8, source_balance=0.5, action_balance=0.3),
         schedule=Schedule(steps=2_700, rate=5e-4, warmup=100, fall=0.5),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class RefinerTraining:
+    """One run of the root refiner (systems.md E1); what its input is perturbed by is in normalised units."""
+
+    model: RefinerConfig = field(default_factory=RefinerConfig)
+    batch: BatchConfig = field(default_factory=BatchConfig)
+    schedule: Schedule = field(default_factory=Schedule)
+    synthetic: float = 0.1
+    feet: float = 2.0  # weight of the toes' speed over the ground, where the true ones stand on it
+    true: float = 0.25  # share of motions that are shown as they are
+    smoothing: int = 4  # at most so often a motion is averaged with its neighbours
+    tremble: float = 0.15  # most noise from frame to frame, standard deviation
+    drift: float = 0.4  # most slow noise
+    slowness: int = 12  # times that the slow noise is averaged with its neighbours
+    seed: int = 0
+
+
+REFINERS: dict[str, RefinerTraining] = {
+    "root-refiner": RefinerTraining(
+        batch=BatchConfig(size=32, whole=0.5, speed=0.3, source_balance=0.5, action_balance=0.3),
+        schedule=Schedule(steps=1_800, rate=1e-3, warmup=100, clip=1.0, fall=0.5),
     ),
 }
 

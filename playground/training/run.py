@@ -15,6 +15,7 @@ from playground.data.library import Library
 from playground.engine import ASSETS
 from playground.errors import PlaygroundError
 from playground.evaluation.networks import build_evaluator
+from playground.generators.refiner import build_refiner
 from playground.motion.representation import Normaliser
 from playground.motion.synthetic import corpus
 from playground.progress import Progress
@@ -25,11 +26,13 @@ from playground.tokenizers.base import Tokenizer
 from playground.training.configs import (
     EVALUATORS,
     GENERATORS,
+    REFINERS,
     REFITS,
     TOKENIZERS,
     EvaluatorTraining,
     FeatureTraining,
     GeneratorTraining,
+    RefinerTraining,
     RefitTraining,
     TokenizerTraining,
     with_steps,
@@ -40,10 +43,11 @@ from playground.training.features import FeatureTask
 from playground.training.generator import GeneratorTask, build_bank
 from playground.training.loop import Fit, Launch, Task, fit, start_fabric
 from playground.training.others import OTHERS
+from playground.training.refiner import RefinerTask
 from playground.training.refit import RefitTask, build_refit_bank
 from playground.training.tokenizer import TokenizerTask
 
-Training = TokenizerTraining | GeneratorTraining | FeatureTraining | RefitTraining | EvaluatorTraining
+Training = TokenizerTraining | GeneratorTraining | FeatureTraining | RefitTraining | RefinerTraining | EvaluatorTraining
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,9 @@ def find_training(name: str, size: str = "cpu") -> Training:
     """The training with that name. PlaygroundError for an unknown name or size."""
     if size not in SIZES:
         raise PlaygroundError(f"unknown size {size!r}; accepted: {', '.join(SIZES)}")
-    known: dict[str, Training] = {**FAMILY[size], **TOKENIZERS, **GENERATORS, **OTHERS, **REFITS, **EVALUATORS}
+    known: dict[str, Training] = {
+        **FAMILY[size], **TOKENIZERS, **GENERATORS, **OTHERS, **REFITS, **REFINERS, **EVALUATORS
+    }  # fmt: skip
     if name not in known:
         raise PlaygroundError(f"unknown training {name!r}; known are {', '.join(known)}")
     return known[name]
@@ -110,6 +116,8 @@ def run_training(training: Training, order: Order) -> dict[str, Any]:
         return _train_features(training, order)
     if isinstance(training, RefitTraining):
         return _train_refit(training, order)
+    if isinstance(training, RefinerTraining):
+        return _train_refiner(training, order)
     return _train_evaluator(training, order)
 
 
@@ -119,6 +127,8 @@ def part_of(training: Training) -> str:
         return training.model.kind
     if isinstance(training, RefitTraining):
         return "refit/tokenizer"
+    if isinstance(training, RefinerTraining):
+        return "refiner"
     return "tokenizer" if isinstance(training, TokenizerTraining) else "generator"
 
 
@@ -231,6 +241,19 @@ def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
     model.load_state_dict(frozen.state_dict(), strict=False)
     validation = whole_batches(held_out, normaliser, config.batch.size) if held_out else []
     task = RefitTask(model, config, bank, batches, validation, store, card, (network, generator_card), fabric.device)
+    return order.fit(fabric, task, config, out)
+
+
+def _train_refiner(config: RefinerTraining, order: Order) -> dict[str, Any]:
+    library, out = Library.open(order.library), order.out / part_of(config)
+    fabric = start_fabric(order.launch, out)
+    batches = training_batches(library, config, library.normaliser, fabric.device)
+    held_out = library_samples(library, "val")
+    validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        network = build_refiner(config.model)
+    task = RefinerTask(network, config, batches, validation, library.name, fabric.device)
     return order.fit(fabric, task, config, out)
 
 
