@@ -93,7 +93,7 @@ CONV_PRESETS: dict[str, ConvConfig] = {
     "mogo": _MOGO,
     "t2mgpt-lite": _lite(_T2MGPT),
     "momask-lite": _lite(_MOMASK),
-    "momaskpp-lite": _lite(_MOMASKPP),
+    "momaskpp-lite": _lite(_MOMASKPP, codes=(256,) * 4),  # batches of 32 motions bring `enough` vectors for 256 codes
     "mosa-lite": _lite(_MOSA, width=112, code_width=160, codes=linear_codes(128, 384, 10), phi="residual"),
     "mogo-lite": _lite(_MOGO, codes=(512,) * 6, code_width=128),
 }
