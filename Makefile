@@ -52,6 +52,7 @@ notebooks: $(DEV) ## execute every notebook; what they show is in build/notebook
 	$(BIN)/jupyter execute --output='../build/notebooks/{notebook_name}' --timeout=1800 notebooks/*.ipynb
 
 figures: $(DEV) $(LIBRARY)/library.json ## make the stored results that are missing or of other checkpoints (hours; stops and goes on at will)
+	$(BIN)/python -m playground.evaluation.published.contents --library $(LIBRARY)
 	$(BIN)/python -m playground.evaluation.published --library $(LIBRARY)
 
 $(LIBRARY)/library.json: | $(DEV)

@@ -8,7 +8,7 @@ from typing import Any
 from playground.analysis.results import RESULTS, Result, files_of, read_result
 from playground.engine import Engine, default_engine
 from playground.errors import PlaygroundError
-from playground.evaluation.published import levels, measures, motions, timing
+from playground.evaluation.published import alignment, levels, measures, motions, timing
 from playground.evaluation.published.base import Progress, Settings
 from playground.systems import SYSTEMS, checkpoint_path, row_of
 
@@ -37,6 +37,7 @@ ITEMS: dict[str, Item] = {
         Item("edits", "the benchmark masks (Fig 11)", motions.edits),
         Item("strips", "motions of prompts (Figs 4, 9, 10)", motions.strips, tokenless=True),
         Item("levels", "levels kept against error, energy and coupling (MOGO, SnapMoGen)", levels.levels, False),
+        Item("alignment", "A then B, B then A: order and attention (CASIM)", alignment.alignment, tokenless=True),
         Item("inference_time", "seconds a motion (Table 9)", timing.inference_time),
     )
 }
