@@ -1,8 +1,9 @@
 """Self-describing checkpoints: one safetensors file holds half-precision weights, and its metadata says the rest.
 
 Metadata: format, kind (tokenizer | generator | evaluator), architecture (a row of architectures.py; absent in old files
-and of evaluators), config, encoder (name, width, hash of the text encoder), data, facts (steps, seconds, seed,
-validation figures). Loading needs no other file and runs no pickle.
+and of evaluators), config, scales (of a tokenizer: tokens a level at full length; absent in old files), encoder (name,
+width, hash of the text encoder), data, facts (steps, seconds, seed, validation figures). Loading needs no other file
+and runs no pickle.
 """
 
 import hashlib
@@ -64,6 +65,8 @@ def save_checkpoint(path: Path, model: nn.Module, card: Card, dtype: torch.dtype
     }
     if card.kind in FIRST:
         metadata["architecture"] = name_of(card.config)
+    if card.kind == "tokenizer":  # for readers that know no config class
+        metadata["scales"] = json.dumps(card.config.scales)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
     save_file(tensors, partial, metadata)

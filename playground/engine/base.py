@@ -229,8 +229,9 @@ class BaseEngine:
             raise PlaygroundError(row.absent)
         if row.tokenizer is None:
             raise PlaygroundError(row.no_tokenizer)
-        config: dict[str, Any] = json.loads(head["__metadata__"]["config"])
-        return config
+        metadata = head["__metadata__"]
+        config: dict[str, Any] = json.loads(metadata["config"])
+        return config | ({"scales": json.loads(metadata["scales"])} if "scales" in metadata else {})
 
     def _stored_examples(self) -> tuple[StoredExample, ...]:
         folder = self.assets / "examples"

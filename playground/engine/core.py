@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,9 @@ from playground.results import Decoded, Generation, GenerationStep, Tokenized
 from playground.stored import StoredAnalysis
 from playground.systems import row_of
 from playground.text.prompts import normalise
+
+if TYPE_CHECKING:
+    from playground.runtime import Runtime
 
 Result = Tokenized | Generation
 DEADLINE = LIMITS.deadline_seconds
@@ -98,7 +101,7 @@ class Engine(BaseEngine):
     def swap(self, result: Result, scale: int, position: int, code: int | str, guidance: float = 0.0) -> Swap:
         """One token replaced by a code (its number, "nearest" or "opposite"), and where the motion changes."""
         check_guidance(guidance)
-        return microscope.swap(self.runtime(result.system), result, scale, position, code, guidance)
+        return microscope.swap(self._with_tokens(result), result, scale, position, code, guidance)
 
     def governed(
         self, result: Result, scale: int, guidance: float = 0.0, deadline: float | None = DEADLINE
@@ -106,7 +109,7 @@ class Engine(BaseEngine):
         """Measured spans [s, 2] of all tokens of a scale: the frames (start, stop) that hold 80 % of the energy of the
         change when the token alone is replaced by its code's opposite; (0, 0) where nothing changes."""
         check_guidance(guidance)
-        return microscope.governed(self.runtime(result.system), result, scale, guidance, deadline_check(deadline))
+        return microscope.governed(self._with_tokens(result), result, scale, guidance, deadline_check(deadline))
 
     # ---- language --------------------------------------------------------------------------------------------------
 
@@ -118,7 +121,7 @@ class Engine(BaseEngine):
     def attention(self, result: Result, caption: str | None = None) -> Attention:
         """Cross-attention of the detokenizer: words by frames. caption None: the one that the tokens go with."""
         text = normalise(result.caption if caption is None else caption, what="caption", allow_empty=True)
-        return language.words_by_frames(self.runtime(result.system), result, text)
+        return language.words_by_frames(self._with_tokens(result), result, text)
 
     # ---- alternatives and regeneration ----------------------------------------------------------------------------
 
@@ -128,7 +131,7 @@ class Engine(BaseEngine):
         """What else a token could have been: the generator's most probable codes, given the coarser scales."""
         listed = whole(count, "the number of alternatives", 1, LIMITS.max_listed)
         how = result.sampling if isinstance(result, Generation) else row_of(result.system).sampling
-        runtime = self.runtime(result.system)
+        runtime = self._with_tokens(result)
         return regeneration.alternatives(runtime, result, how, scale, position, listed, deadline_check(deadline))
 
     def regenerate_steps(
@@ -148,7 +151,7 @@ class Engine(BaseEngine):
         """
         chosen = generation.seed if seed is None else seed
         check_sampling(chosen, **vars(generation.sampling))
-        runtime, check = self.runtime(generation.system), deadline_check(deadline)
+        runtime, check = self._with_tokens(generation), deadline_check(deadline)
         yield from regeneration.regenerate_steps(runtime, generation, scale, position, code, chosen, check, previews)
 
     def regenerate(
@@ -214,7 +217,7 @@ class Engine(BaseEngine):
         edited_frames(kind, chosen, source.motion.frames)
         start, stop = chosen
         request = EditRequest(kind, (int(start), int(stop)), text, seed, how, anchor, measured)
-        return edit(self.runtime(source.system), source, request, check)
+        return edit(self._with_tokens(source), source, request, check)
 
     # ---- maps ------------------------------------------------------------------------------------------------------
 
@@ -236,6 +239,13 @@ class Engine(BaseEngine):
         """The stored analysis of a system: maps, counts, tokens of test clips. PlaygroundError where there is none."""
         found = codes.open_analysis(self.assets / "analysis", row_of(system).name)
         return found if found is not None else StoredAnalysis.read(self.assets / "analysis", system)
+
+    def _with_tokens(self, result: Result) -> "Runtime":
+        """The loaded models of a result's system. PlaygroundError if it has no tokens."""
+        runtime = self.runtime(result.system)
+        if runtime.codec is None:
+            raise PlaygroundError(row_of(result.system).no_tokenizer)
+        return runtime
 
     def _check_code(self, system: str, scale: int, code: int) -> None:
         sizes = self.scales(system)
