@@ -48,11 +48,15 @@ class BaseEngine:
         return [describe(self.assets, row) for row in SYSTEMS.values()]
 
     def scales(self, system: str) -> list[tuple[int, int]]:
-        """(tokens, codes) of every scale at full length, coarse to fine, [] without a tokenizer; loads no weight."""
+        """(tokens, codes) of every scale at full length, coarse to fine; [] without a tokenizer.
+
+        Loads no weight, but for a file from before its scales were written into the header.
+        """
         if row_of(system).tokenizer is None:
             return []
         config = self._config(system)
-        return list(zip(config["scales"], config["codes"], strict=True))
+        scales = config.get("scales") or self.runtime(system).tokenizer.config.scales
+        return list(zip(scales, config["codes"], strict=True))
 
     def sizes(self, system: str, frames: int) -> tuple[int, ...]:
         """Tokens of every scale of a motion of so many frames, coarse to fine; () without a tokenizer."""
