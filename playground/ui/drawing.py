@@ -123,12 +123,15 @@ class Result:
 
     @property
     def title(self) -> str:
-        """One line for the list of the visit."""
-        words = self.wish.prompt or "no prompt"
-        words = words if len(words) <= 32 else words[:31].rstrip() + "…"
+        """Its words, for the list of the visit."""
+        return self.wish.prompt or "no prompt"
+
+    @property
+    def tail(self) -> str:
+        """What tells it from other results of the same words."""
         first, last = self.takes[0].seed, self.takes[-1].seed
-        tail = f", changed at scale {self.changes[-1].scale}" if self.changes else ""
-        return f"{words} · seed {first}" + (f" to {last}" if last != first else "") + tail
+        changed = f", changed at scale {self.changes[-1].scale}" if self.changes else ""
+        return f"seed {first}" + (f" to {last}" if last != first else "") + changed
 
     @property
     def address(self) -> dict[str, object]:

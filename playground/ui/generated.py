@@ -48,7 +48,7 @@ def _view(
     figures = [scene.figure(BEFORE, "Before", before.motion.joints, system.name)] if before else []
     ghost = BEFORE if before else None
     for n, (one, name) in enumerate(zip(made, names, strict=True)):
-        told = growing or ("its tokens are below" if several and n == take else "")
+        told = growing or ("tokens below" if several and n == take else "")
         id = f"made{n or ''}"
         figures.append(scene.figure(id, name, one.motion.joints, system.name, told, ghost_of=ghost))
     marks = [new.ids != old.ids for new, old in zip(shown.levels, before.levels, strict=False)] if before else None
@@ -81,7 +81,7 @@ def earlier(visit: Visit) -> str:
     """The list of the visit, newest first; "" while there is nothing to go back to."""
     if len(visit.results) < 2:
         return ""
-    entries = [Entry(str(n), one.title, one is visit.shown) for n, one in enumerate(visit.results)]
+    entries = [Entry(str(n), one.title, one is visit.shown, one.tail) for n, one in enumerate(visit.results)]
     return shelf("This visit", entries[::-1])
 
 

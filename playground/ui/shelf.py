@@ -10,8 +10,9 @@ class Entry:
     """One button of a list."""
 
     id: str
-    text: str
+    text: str  # what may be cut where there is little room
     chosen: bool = False
+    tail: str = ""  # what tells it from the others, never cut
 
 
 def shelf(title: str, entries: Sequence[Entry]) -> str:
@@ -24,10 +25,7 @@ def shelf(title: str, entries: Sequence[Entry]) -> str:
 
 
 def _button(entry: Entry) -> str:
-    id, text, pressed = (
-        html.escape(entry.id, quote=True),
-        html.escape(entry.text, quote=True),
-        str(entry.chosen).lower(),
-    )
-    data = f'data-do="open" data-code="{id}" data-key="{id}"'
-    return f'<button type="button" {data} aria-pressed="{pressed}" title="{text}">{text}</button>'
+    id, text, tail = (html.escape(words, quote=True) for words in (entry.id, entry.text, entry.tail))
+    data = f'data-do="open" data-code="{id}" data-key="{id}" aria-pressed="{str(entry.chosen).lower()}"'
+    rest = f"<small>{tail}</small>" if tail else ""
+    return f'<button type="button" {data} title="{text} {tail}"><span>{text}</span>{rest}</button>'

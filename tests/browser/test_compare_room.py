@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.conftest import PHONE, Visit
+from tests.browser.conftest import DESKTOP, PHONE, Visit
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
@@ -116,3 +116,11 @@ def test_compare_begins_where_guidance_stands(visit: Go, stand_in: str) -> None:
     expect(page).to_have_url(re.compile("motion=m2"))
     page.go_back()
     expect(page.get_by_role("tab", name="Guidance", exact=True)).to_have_attribute("aria-selected", "true")
+
+
+def test_five_edits_side_by_side_leave_the_score_in_sight(visit: Go, stand_in: str) -> None:
+    page = visit(f"{stand_in}?room=compare&vary=redraw&values=0_1_2_3_4&motion=m2").page
+    page.wait_for_function(SHOWN, arg=6)
+    expect(page.locator("#compare-take tbody tr")).to_have_count(5)
+    score = page.locator("#compare-score .ms-roll").bounding_box()
+    assert score is not None and score["y"] + score["height"] <= DESKTOP["height"]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import PHONE, Visit
+from tests.browser.conftest import DESKTOP, PHONE, Visit
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
@@ -77,3 +77,20 @@ def test_a_phone_shows_the_card_of_a_token(visit: Go, stand_in: str) -> None:
     page.wait_for_function(DONE, arg=1)
     pick_token(page)
     assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_six_seeds_and_a_long_visit_leave_the_score_in_sight(visit: Go, stand_in: str) -> None:
+    page = visit(f"{stand_in}?room=generate&takes=6&seconds=2").page
+    page.wait_for_function(DONE, arg=6)
+    pick_token(page)
+    page.locator("#generate-token [data-do=code]:enabled").first.click()
+    page.wait_for_function(DONE, arg=2)
+    page.get_by_role("button", name="Back to the prompt").click()
+    expect(page.locator("#generate-earlier button")).to_have_count(2)
+    expect(page.locator("#generate-earlier small").first).to_contain_text("changed at scale 3")
+    page.locator("#generate-earlier button").last.click()
+    page.wait_for_function(DONE, arg=6)
+    page.get_by_role("button", name="Sampling and guidance").click()
+    expect(page.locator("#generate-temperature")).to_be_visible()
+    score = page.locator("#generate-score .ms-roll").bounding_box()
+    assert score is not None and score["y"] + score["height"] <= DESKTOP["height"]

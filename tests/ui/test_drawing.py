@@ -183,3 +183,14 @@ def test_a_code_that_cannot_be_drawn_is_said_so(services: Services) -> None:
     card = token_card(found, 1, ["#000000"] * 8)
     assert card.count("cut off") == 2  # in the row's words and in what is read out
     assert "all other tokens anew." in card
+
+
+def test_the_list_of_the_visit_tells_results_of_the_same_words_apart(services: Services) -> None:
+    visit = Visit()
+    for takes in (1, 3):
+        visit.keep(last_of(draw(services, wish(takes))))
+    visit.keep(last_of(change(services, visit.results[0], 0, Change(4, 1, 2))))
+    text = earlier(visit)
+    assert text.count("<span>a person sits</span>") == 3 and text.count('aria-pressed="true"') == 1
+    assert [one.tail for one in visit.results] == ["seed 3", "seed 3 to 5", "seed 3, changed at scale 4"]
+    assert all(f"<small>{one.tail}</small>" in text for one in visit.results)

@@ -200,7 +200,8 @@ def room(services: Services) -> None:
             card = inspector(elem_id="generate-token")
             with gr.Column(elem_classes=["mtp-form"], min_width=0):
                 prompt, seconds, seed, takes, buttons = _controls(opening)
-            which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="generate-take")
+            which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="generate-take",
+                             elem_classes=["mtp-segments"])  # fmt: skip
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
             further = gr.HTML("", elem_id="generate-onward", apply_default_css=False)
