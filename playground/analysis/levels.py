@@ -18,8 +18,9 @@ def coupling(cross: ArrayLike, first: float, second: float) -> float:
 
     nan where one side does not vary.
     """
-    scale = float(np.sqrt(first * second))
-    return float(np.linalg.norm(np.asarray(cross, np.float64))) / scale if scale > 0 else float("nan")
+    if first <= 0 or second <= 0:
+        return float("nan")
+    return float(np.linalg.norm(np.asarray(cross, np.float64))) / float(np.sqrt(first * second))
 
 
 class LevelMoments:
@@ -73,13 +74,20 @@ class LevelMoments:
             cross = np.einsum("dje,j->de", whole[level], rest)
             own = float(np.trace(whole[level, :, level]))
             other = float(np.einsum("i,idjd,j->", rest, whole, rest))
-            found.append(coupling(cross, own, max(other, 0.0)))
+            found.append(coupling(cross, *self._real(whole, own, other)))
         return np.array(found)
 
     def between(self) -> Floats:
         """Coupling of every level with every other one, float64 [N, N]; the diagonal is a level with itself."""
-        whole = self.covariance()[1:, :, 1:]
-        total = [float(np.trace(whole[n, :, n])) for n in range(self.levels)]
+        every = self.covariance()
+        whole = every[1:, :, 1:]
+        total = self._real(every, *(float(np.trace(whole[n, :, n])) for n in range(self.levels)))
         return np.array(
             [[coupling(whole[i, :, j], total[i], total[j]) for j in range(self.levels)] for i in range(self.levels)]
         )
+
+    @staticmethod
+    def _real(whole: Floats, *variances: float) -> list[float]:
+        """Variances, those that are rounding beside the largest squares as 0."""
+        least = 1e-12 * float(np.einsum("idid->", whole))
+        return [value if value > least else 0.0 for value in variances]
