@@ -215,6 +215,9 @@ def _for_data(command: Command) -> None:
     sub.add_argument("--guidance", type=_number, help="guidance scale g of the decoder (default: the system's own)")
     sub.add_argument("--cfg", type=_number, help="guidance scale of the generator (default: the system's own)")
     sub.add_argument(
+        "--refine", action="store_true", help="generated motions go through the root refiner (feet slide less)"
+    )
+    sub.add_argument(
         "--json", dest="to", type=_output(), metavar="OUT",
         help="file to write (default: stdout); the same call goes on with its finished repeats",
     )  # fmt: skip

@@ -83,6 +83,7 @@ class Generation:
     features: Floats = field(repr=False)  # [F, 67], normalised
     seconds: float = 0.0
     sampling: SamplingDefaults = field(default_factory=SamplingDefaults)  # what it was drawn and decoded with
+    refiner: str = ""  # checkpoint of the root refiner that its way over the ground comes from; "" for none
 
     @property
     def caption(self) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from playground.engine import codes, language, microscope, placement, regeneration, scales
+from playground.engine import codes, language, microscope, placement, refining, regeneration, scales
 from playground.engine.base import BaseEngine
 from playground.engine.checks import (
     UNIT,
@@ -218,6 +218,22 @@ class Engine(BaseEngine):
         start, stop = chosen
         request = EditRequest(kind, (int(start), int(stop)), text, seed, how, anchor, measured)
         return edit(self._with_tokens(source), source, request, check)
+
+    # ---- the root refiner ------------------------------------------------------------------------------------------
+
+    @property
+    def refines(self) -> bool:
+        """Whether a root refiner is shipped; loads no weight."""
+        return refining.refiner_path(self.assets).is_file()
+
+    def refiner(self) -> refining.Refiner:
+        """The shipped root refiner. PlaygroundError where there is none."""
+        return refining.open_refiner(self.assets)
+
+    def refine(self, generation: Generation) -> Generation:
+        """The same body movement and the same tokens, with the way over the ground computed anew from that movement,
+        so that standing feet slide less. PlaygroundError where no root refiner is shipped."""
+        return refining.refine(self.refiner(), self.runtime(generation.system), generation)
 
     # ---- maps ------------------------------------------------------------------------------------------------------
 

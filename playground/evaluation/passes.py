@@ -16,12 +16,13 @@ from playground.evaluation.items import Item, portions
 from playground.evaluation.judges import judge_motion
 from playground.evaluation.prompts_obeyed import Prompt
 from playground.evaluation.spread import Spread, Tally
-from playground.motion.measures import bone_drift, foot_sliding, joint_errors
+from playground.motion.measures import bone_drift, foot_sliding, joint_errors, path_drift
 from playground.motion.representation import from_features67
 
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from playground.engine.refining import Refiner
     from playground.evaluation.evaluators import Evaluator
     from playground.runtime import Runtime
 
@@ -31,11 +32,15 @@ Rows = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Measured on n motions. embeddings: evaluator -> [n, D]; sliding [n] mm/s, nan without contact; drift [n] mm."""
+    """Measured on n motions. embeddings: evaluator -> [n, D]; sliding [n] mm/s, nan without contact; drift [n] mm.
+
+    path: [n] metres between the way over the ground and what it was before the root refiner; 0 without one.
+    """
 
     embeddings: dict[str, Floats]
     sliding: Floats
     drift: Floats
+    path: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +78,7 @@ class Passes:
         guidance: float,
         sampling: dict[str, Any],
         spread: Spread,
+        refiner: "Refiner | None" = None,
     ) -> None:
         self.runtime = runtime
         self.library = library
@@ -80,6 +86,7 @@ class Passes:
         self.guidance = guidance  # of the detokenizer, for generated motions; rebuilt ones are decoded with 0
         self.sampling = sampling  # of the generator: cfg, temperature, top_k, top_p
         self.spread = spread
+        self.refiner = refiner  # of generated motions
         self.tally = Tally(None, 0)
 
     # ---- passes ---------------------------------------------------------------------------------------------------
@@ -105,7 +112,11 @@ class Passes:
         """Motions made from the captions, as long as the recorded ones."""
         motions = self._nothing(len(items))
         for part in self._mine(items):
-            self._fill(motions, part, self._generate([items[place] for place in part]))
+            made = self._generate([items[place] for place in part])
+            refined = self._refined(made)
+            self._fill(motions, part, refined)
+            for place, before, after in zip(part, made, refined, strict=True):
+                motions.path[place] = path_drift(from_features67(before), from_features67(after))
             self.tally.add(len(part))
         return self._shared(motions)
 
@@ -143,7 +154,7 @@ class Passes:
         """Embeddings [n, D] by one evaluator of motions made from the captions."""
         out = np.zeros((len(items), self.evaluators[name].width))
         for part in self._mine(items):
-            out[part] = self.embed(name, self._generate([items[place] for place in part]))
+            out[part] = self.embed(name, self._refined(self._generate([items[place] for place in part])))
             self.tally.add(len(part))
         return self.spread.total(out)
 
@@ -151,7 +162,7 @@ class Passes:
         """1 for every prompt that its generated motion obeys, else 0; [n]."""
         out = np.zeros(len(items))
         for part in self._mine(items):
-            made = self._generate([items[place] for place in part])
+            made = self._refined(self._generate([items[place] for place in part]))
             for place, rows in zip(part, made, strict=True):
                 out[place] = not judge_motion(prompts[place].judge, from_features67(rows))
             self.tally.add(len(part))
@@ -204,6 +215,9 @@ class Passes:
     def _generate(self, batch: Sequence[Item]) -> list[Rows]:
         captions, rows, seeds = [i.caption for i in batch], [i.rows for i in batch], [i.seed for i in batch]
         return self.runtime.make_batch(captions, rows, seeds, self.sampling, self.guidance)
+
+    def _refined(self, made: list[Rows]) -> list[Rows]:
+        return made if self.refiner is None else self.refiner.rows(made)
 
     def _cut(self, batch: Sequence[Item], heading: str = "body") -> list[Rows]:
         return [self.library.features(i.index, heading)[i.start : i.start + i.rows] for i in batch]
@@ -260,7 +274,7 @@ class Passes:
 
     def _nothing(self, count: int) -> Motions:
         embeddings = {name: np.zeros((count, evaluator.width)) for name, evaluator in self.evaluators.items()}
-        return Motions(embeddings, np.zeros(count), np.zeros(count))
+        return Motions(embeddings, *np.zeros((3, count)))
 
     def _fill(self, motions: Motions, part: list[int], rows: list[Rows], made: bool = True) -> None:
         for name in self.evaluators:
@@ -271,7 +285,8 @@ class Passes:
 
     def _shared(self, motions: Motions) -> Motions:
         embeddings = {name: self.spread.total(array) for name, array in motions.embeddings.items()}
-        return Motions(embeddings, self.spread.total(motions.sliding), self.spread.total(motions.drift))
+        rest = (motions.sliding, motions.drift, motions.path)
+        return Motions(embeddings, *(self.spread.total(array) for array in rest))
 
 
 def _padded(ids: "Sequence[Tensor]", real: "Sequence[Tensor]", scales: Sequence[int]) -> NDArray[np.int64]:

@@ -27,6 +27,7 @@ BY_MAIN = ("fid", *PRECISION, "mm_dist", "diversity")
 DRAWN = ("multimodality", "prompts_obeyed")  # of generated motions alone
 TOKENS = ("mpjpe_mm", "usage", "code_perplexity", "model_perplexity_nll", "model_perplexity_argmax")
 KEYS = (*BY_MAIN, *DRAWN, "clip_score", *TOKENS, "foot_sliding", "bone_drift")
+REFINED = "path_drift"  # of generated motions whose root was refined, beside KEYS: metres
 
 Floats = NDArray[np.float64]
 Table = dict[str, dict[str, Any]]  # metric -> {"value", "n"}, or {"value": None, "n": 0, "why"}
@@ -106,7 +107,10 @@ class Repeat:
         if not self.passes.runtime.generates:
             return _absent(KEYS, f"the system {self.passes.runtime.name} has no generator")
         prompts, asked = prompt_items(self.plan.seed, self.number)
-        table = self._motions(self.passes.generated(self.items), recorded)
+        motions = self.passes.generated(self.items)
+        table = self._motions(motions, recorded)
+        if self.passes.refiner is not None:
+            table[REFINED] = _entry(average(motions.path, what="path drift"), len(self.items))
         table["prompts_obeyed"] = _entry(average(self.passes.obeyed(prompts, asked)), len(asked))
         return table | {"multimodality": self._multimodality()}
 
@@ -204,7 +208,7 @@ def summarise(tables: Sequence[Table]) -> Table:
     which says nothing of the spread. n is the sample of one repeat. A metric that one repeat lacks has no mean.
     """
     out: Table = {}
-    for key in [key for key in KEYS if key in tables[0]]:
+    for key in [key for key in (*KEYS, REFINED) if key in tables[0]]:
         entries = [table[key] for table in tables]
         missing = next((entry for entry in entries if entry["value"] is None), None)
         if missing is not None:

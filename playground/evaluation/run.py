@@ -35,7 +35,8 @@ class Order:
     """What is asked beyond reconstruction; nothing with repeats = 0.
 
     guidance, cfg: of the decoder and of the generator, the system's own by default. out: the file of the result, beside
-    which the state is kept. evaluators: the shipped ones by default.
+    which the state is kept. evaluators: the shipped ones by default. refine: generated motions go through the shipped
+    root refiner.
     """
 
     repeats: int = 0
@@ -46,6 +47,7 @@ class Order:
     cfg: float | None = None
     out: Path | None = None
     evaluators: dict[str, "Evaluator"] | None = None
+    refine: bool = False
 
     def check(self) -> None:
         """PlaygroundError for a number out of range."""
@@ -56,6 +58,8 @@ class Order:
             raise PlaygroundError(f"the seed must be a whole number from 0 to {LIMITS.max_seed}")
         check_guidance(self.guidance or 0.0)
         check_guidance(self.cfg or 0.0, "cfg")
+        if self.refine and not self.repeats:
+            raise PlaygroundError("--refine is of generated motions; ask for at least one repeat of them: --repeats 1")
 
     def sampling(self, system: str) -> SamplingDefaults:
         """How motions are generated: the system's own settings but for those asked for."""
@@ -101,7 +105,11 @@ def evaluate(
     )  # fmt: skip
     if not spread.first:
         return {}
-    shown = {key: campaign.settings[key] for key in ("generator", "sampling", "evaluators")}
+    shown = {
+        key: campaign.settings[key]
+        for key in ("generator", "sampling", "evaluators", "refiner")
+        if key in campaign.settings
+    }
     asked = {"repeats": order.repeats, "mm_texts": plan.mm_texts, "mm_samples": plan.mm_samples}
     return base | asked | shown | {name: summarise([repeat[name] for repeat in repeats]) for name in TABLES}
 
@@ -149,6 +157,7 @@ def set_up(system: str, library: Library, split: str, order: Order, engine: Engi
     clips = measurable(library, library.split(split))
     evaluators = shipped_evaluators() if order.evaluators is None else order.evaluators
     sampling = order.sampling(system)
+    refiner = engine.refiner() if order.refine else None
     settings = {
         "system": system,
         "checkpoint": runtime.checkpoint,
@@ -160,12 +169,14 @@ def set_up(system: str, library: Library, split: str, order: Order, engine: Engi
         "sampling": asdict(sampling),
         "evaluators": {name: one.hash[:12] for name, one in evaluators.items()},
     }
+    if refiner is not None:
+        settings["refiner"] = refiner.checkpoint
     captions, prompts = CachedEncoder(runtime.encoder, capacity=TEXTS_KEPT), runtime.prompt_encoder
     prompts = None if prompts is None else CachedEncoder(prompts, capacity=TEXTS_KEPT)
     local = replace(runtime.to(spread.device), encoder=captions, prompt_encoder=prompts)
     drawing = asdict(sampling)
     guidance = drawing.pop("guidance")
-    return Campaign(Passes(local, library, evaluators, guidance, drawing, spread), clips, settings)
+    return Campaign(Passes(local, library, evaluators, guidance, drawing, spread, refiner), clips, settings)
 
 
 def shipped_evaluators() -> dict[str, "Evaluator"]:

@@ -48,6 +48,17 @@ def foot_sliding(joints: ArrayLike, fps: float = LIMITS.fps, floor: float = 0.0)
     return float((weight * speed).sum() / total) if total > 0 else float("nan")
 
 
+def path_drift(a: ArrayLike, b: ArrayLike) -> float:
+    """How far apart two motions of one length walk, in metres: the mean distance of their roots over the ground.
+
+    a, b: [F, 22, 3] metres, Y up, in one coordinate system. PlaygroundError as in `mpjpe`.
+    """
+    first, second = _joints(a), _joints(b)
+    if first.shape != second.shape:
+        raise PlaygroundError(f"two motions of one length are compared, got {len(first)} and {len(second)} frames")
+    return float(np.linalg.norm((first - second)[:, 0][:, (0, 2)], axis=-1).mean())
+
+
 def bone_drift(joints: ArrayLike) -> float:
     """How much the bones change their length during a motion, in mm; 0 is a rigid skeleton.
 

@@ -150,7 +150,7 @@ class RefinerTraining:
 REFINERS: dict[str, RefinerTraining] = {
     "root-refiner": RefinerTraining(
         batch=BatchConfig(size=32, whole=0.5, speed=0.3, source_balance=0.5, action_balance=0.3),
-        schedule=Schedule(steps=1_800, rate=1e-3, warmup=100, clip=1.0, fall=0.5),
+        schedule=Schedule(steps=1_400, rate=1e-3, warmup=100, clip=1.0, fall=0.5),
     ),
 }
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from playground.errors import PlaygroundError
-from playground.motion.measures import bone_drift, foot_sliding, joint_errors, mpjpe
+from playground.motion.measures import bone_drift, foot_sliding, joint_errors, mpjpe, path_drift
 from playground.motion.skeleton import HUMAN22
 
 SEEDS = st.integers(0, 2**16)
@@ -118,3 +118,14 @@ def test_a_rigid_body_does_not_drift() -> None:
     pose = motion(1, 5)
     turned = pose @ np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert bone_drift(np.concatenate([pose, turned + 3.0, pose - 1.0])) == pytest.approx(0.0, abs=1e-9)
+
+
+@given(st.integers(1, 6), SEEDS)
+def test_path_drift_against_a_loop(frames: int, seed: int) -> None:
+    a, b = motion(frames, seed), motion(frames, seed + 1)
+    total = sum(math.hypot(a[f, 0, 0] - b[f, 0, 0], a[f, 0, 2] - b[f, 0, 2]) for f in range(frames))
+    assert path_drift(a, b) == pytest.approx(total / frames)
+    raised = a + np.array([0.0, 3.0, 0.0])
+    assert path_drift(a, raised) == 0.0
+    with pytest.raises(PlaygroundError, match="one length"):
+        path_drift(a, motion(frames + 1, seed))
