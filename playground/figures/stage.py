@@ -200,6 +200,20 @@ def badge(kind: str, seconds: float | None = None, text: str = "") -> Json:
     return {"kind": kind, "seconds": None if seconds is None else float(seconds), "text": text}
 
 
+def growing(first: int, window: int, ahead: int, play: bool = False) -> Json:
+    """What makes a payload a piece of a motion that grows: its first frame on a clock that runs on, the frames that the
+    stage keeps at most, and the frames ahead of the playhead below which it asks for the next piece.
+
+    A piece of the same scene that begins where the one before ended joins it; any other one begins anew and plays,
+    where the visitor asks for calm with `play` only.
+    """
+    if first < 0 or not 1 <= ahead < window:
+        raise PlaygroundError(
+            f"a piece needs a first frame of 0 or more and 1 <= ahead < window, got {ahead}, {window}"
+        )
+    return {"first": int(first), "window": int(window), "ahead": int(ahead), "play": play}
+
+
 def payload(
     figures: Sequence[Json],
     tracks: Sequence[Json] = (),
@@ -210,10 +224,13 @@ def payload(
     hatch: Sequence[tuple[int, int]] = (),
     hatched: str = "kept as it was",
     scene: str | None = None,
+    growing: Json | None = None,
+    ribbon: Sequence[tuple[int, str]] = (),
 ) -> Json:
     """The whole stage, checked. strips: heat maps under the score; hatch: spans (first, last+1 frame) that are hatched
     on timeline and score, and `hatched` what that means; scene: what is shown, in any words: clock and selection go on
-    while it is the same and start anew with another (None: told by the figures).
+    while it is the same and start anew with another (None: told by the figures); growing: of a piece of a motion that
+    goes on; ribbon: (first frame, words) over the score, each until the next one.
 
     PlaygroundError if figures are none or too many, ids repeat or point nowhere, spans are not in order.
     """
@@ -241,6 +258,9 @@ def payload(
         or any(not 0 <= e <= longest for e in edges)
     ):
         raise PlaygroundError(f"hatched spans must be (first, last+1) in order and apart, within 0..{longest}")
+    starts = [start for start, _ in ribbon]
+    if starts != sorted(set(starts)):
+        raise PlaygroundError("the words of a ribbon must begin one after the other")
     return {
         "version": VERSION,
         "fps": int(fps),
@@ -254,6 +274,8 @@ def payload(
         "hatch": [[int(start), int(stop)] for start, stop in hatch],
         "hatched": hatched,
         "scene": scene,
+        "growing": growing,
+        "ribbon": [[int(start), text] for start, text in ribbon],
     }
 
 

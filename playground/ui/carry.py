@@ -59,6 +59,11 @@ def _edit(services: Services, state: State) -> Values:
     return {"vary": "redraw", "values": values, **{key: state.values.get(key) for key in keys}}
 
 
+def _endless(services: Services, state: State) -> Values:
+    """The first instruction, as clips of a given length."""
+    return {"vary": "s", "prompt": state["prompt"], "seed": state["seed"]}
+
+
 def _codebooks(services: Services, state: State) -> Values:
     """The systems side by side, on a motion; with one system alone what its scales add."""
     return {"vary": _systems_or_scales(services)}
@@ -88,4 +93,5 @@ CARRIES: dict[str, Callable[[Services, State], Values]] = {
     "generate": _generate,
     "guidance": _guidance,
     "edit": _edit,
+    "endless": _endless,
 }

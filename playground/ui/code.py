@@ -16,6 +16,7 @@ from playground.ui.comparing import EDIT, PROMPT, VARIATIONS, Setting
 from playground.ui.drawing import MADE, read_changes
 from playground.ui.placing import SECONDS, SEED
 from playground.ui.state import OWN_FILE, State, Token
+from playground.ui.walking import PIECE, SYSTEM, read_plan
 
 _SLIDES = """
 for name, result in results.items():
@@ -179,6 +180,25 @@ def _edit(state: State) -> tuple[str, str]:
     )
 
 
+def _endless(state: State) -> tuple[str, str]:
+    said = read_plan(str(state["then"] or ""))
+    rows = "".join(f"    ({one.frame}, {literal(one.prompt)}),\n" for one in said)
+    then = f"then = [  # frame from which it holds, instruction\n{rows}]\n" if said else "then = []\n"
+    frames = LIMITS.fps * max(20, (said[-1].frame // LIMITS.fps if said else 0) + 8)
+    return "A motion without end, told what to do next while it moves.", (
+        "from pathlib import Path\n\nimport numpy as np\n\nfrom playground.engine import default_engine\n"
+        "from playground.motion.formats import write_motion\nfrom playground.motion.motion import Motion\n\n"
+        f"session = default_engine().endless({literal(state['prompt'])}, system={literal(SYSTEM)}, "
+        f"seed={int(state['seed'])})\n{then}parts = []\n"
+        f"while session.frames < {frames}:  # or for as long as you like\n"
+        "    while then and then[0][0] <= session.drawn:\n        session.say(then.pop(0)[1])\n"
+        f"    parts.append(session.advance({number(PIECE)}).joints)\n"
+        "seams = session.seams()\n"
+        'print("jerk, m/s3: at the switches", seams.at_switches, " elsewhere", seams.elsewhere)\n'
+        'write_motion(Motion(np.concatenate(parts)), Path("endless.bvh"))\n'
+    )
+
+
 def _compare(state: State) -> tuple[str, str]:
     """`settings` of the state are those of comparing.settings_of, which complete() has filled in."""
     of, settings = VARIATIONS[state["vary"]].of, list(state.values["settings"])
@@ -238,5 +258,6 @@ SCRIPTS: dict[str, Callable[[State], tuple[str, str]]] = {
     "generate": _generate,
     "guidance": _guidance,
     "edit": _edit,
+    "endless": _endless,
     "compare": _compare,
 }

@@ -11,12 +11,14 @@ from collections.abc import Callable, Sequence
 from playground.engine import default_engine
 from playground.errors import PlaygroundError
 from playground.ui.previews import write_previews
-from playground.ui.rooms import codebooks, compare, edit, embedding, generate, guidance, tokenize
+from playground.ui.rooms import codebooks, compare, edit, embedding, endless, generate, guidance, tokenize
 from playground.ui.services import Services
 from playground.ui.view import View
+from playground.ui.walking import is_here
 
 OPENINGS: dict[str, Callable[[Services], View]] = {
-    room.NAME: room.opening_view for room in (tokenize, embedding, codebooks, generate, guidance, edit, compare)
+    room.NAME: room.opening_view
+    for room in (tokenize, embedding, codebooks, generate, guidance, edit, endless, compare)
 }
 
 
@@ -27,6 +29,8 @@ def write_openings(services: Services, names: Sequence[str] = ()) -> list[str]:
     """Compute and store the first result of the rooms named, all by default; returns their names."""
     chosen = [name for name in OPENINGS if not names or name in names]
     for name in chosen:
+        if name == endless.NAME and not is_here(services):
+            continue  # its system is not trained yet
         made = OPENINGS[name](services)
         made = OPENINGS[name](services) if made.kind == "live" else made  # the first run pays for loading the models
         made.stored(services.fingerprint()).write(services.opening_path(name))

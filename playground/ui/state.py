@@ -22,7 +22,7 @@ from playground.ui.places import Scales as Scales
 from playground.ui.places import Span as Span
 from playground.ui.places import Token as Token
 
-ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "compare", "learn")
+ROOMS = ("tokenize", "embedding-map", "codebooks", "generate", "guidance", "edit", "endless", "compare", "learn")
 PARTS = {name: f'[data-part="{name}"]' for name in ("link", "python", "export", "tour", "compare")} | {
     "learn": "#room-learn-button"
 }  # parts of the page, beside controls, that `hide` may name -> how the page finds them
@@ -119,6 +119,9 @@ CONTROLS: tuple[Control, ...] = (
     Control("s", "edit", "number", None, "Guidance s, generator", 0, _G, element="edit-s"),
     Control("anchor", "edit", "choice", "place", "Kept frames that follow", 0, 0, ("place", "body"), "edit-anchor"),
     Control("measured", "edit", "flag", False, "Tokens by measured frames", element="edit-measured"),
+    Control("prompt", "endless", "text", "a person walks forward", "Instruction", 1, _PROMPT, element="endless-prompt"),
+    Control("seed", "endless", "whole", 0, "Seed", 0, _SEED, element="endless-seed"),
+    Control("then", "endless", "text", None, "What follows, by second", 1, 2_000, element="endless-then"),
     *_of_stage("compare", "compare"),
     Control("vary", "compare", "choice", "scales", "What differs", element="compare-vary", choices=DIFFERENCES),
     Control("values", "compare", "name", None, "Side by side", element="compare-values"),

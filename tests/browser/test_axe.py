@@ -18,6 +18,7 @@ ROOMS = {  # room -> what stands there once it is whole
     "Tokenize": "#tokenize-energy .plotly", "Embedding map": "#embedding-map .plotly",
     "Codebooks": "#codebooks-summary .plotly", "Generate": "#generate-score .ms-heads",
     "Guidance": "#guidance-sweep .plotly", "Edit": "#edit-score .ms-heads", "Compare": "#compare-take table",
+    "Endless": "#endless-score .ms-ribbon li",
     "Learn": "#learn-page article",
 }  # fmt: skip
 DEVICES: dict[str, dict[str, Any]] = {

@@ -10,8 +10,8 @@ from tests.browser.conftest import DESKTOP, PHONE, Visit
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
-ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit", "Compare")
-STAGES = {room: room.lower() for room in ("Tokenize", "Generate", "Guidance", "Edit", "Compare")}
+ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit", "Endless", "Compare")
+STAGES = {room: room.lower() for room in ("Tokenize", "Generate", "Guidance", "Edit", "Endless", "Compare")}
 STAGES["Embedding map"] = "embedding"
 CONTROLS = {
     "Tokenize": "#tokenize-scales input[type=range]",
@@ -19,6 +19,7 @@ CONTROLS = {
     "Generate": "#generate-go",
     "Guidance": "#guidance-g input[type=range]",
     "Edit": "#edit-go",
+    "Endless": "#endless-go",
     "Compare": "#compare-go",
 }
 

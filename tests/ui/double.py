@@ -26,6 +26,7 @@ from playground.systems import SystemInfo
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 from tests.ui.double_drawing import Drawing
+from tests.ui.double_endless import Endless
 from tests.ui.double_studies import Studies, shaken
 
 SIZES = (1, 2, 3, 4, 6, 8, 12, 18, 26, 36)
@@ -74,7 +75,7 @@ def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
     return index.astype(np.int32), np.zeros(8, np.float32), np.eye(3, 8, dtype=np.float32), scores, places
 
 
-class FakeEngine(Drawing, Studies):
+class FakeEngine(Drawing, Studies, Endless):
     """What the rooms use of the engine. `pause` is called before every scale of a generation."""
 
     def __init__(self, pause: Callable[[], None] = lambda: None) -> None:

@@ -33,6 +33,7 @@ CARRIED = [
     ("?room=guidance&motion=m1&g=1.35", {"vary": "g", "motion": "m1"}),
     ("?room=edit&motion=m1&prompt=bows&kind=prefix&from=1&to=2&seed=1",
      {"vary": "redraw", "values": "1_2_3", "motion": "m1", "prompt": "bows", "kind": "prefix", "from": 1.0, "to": 2.0}),
+    ("?room=endless&prompt=a+b&seed=4", {"vary": "s", "prompt": "a b", "seed": 4}),
     ("?room=edit&motion=made_0_3_0_4_1_0.5_0.9&caption=a+person+sits", {"vary": "redraw", "caption": "a person sits"}),
 ]  # fmt: skip
 

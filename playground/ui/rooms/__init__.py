@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from playground.ui.rooms import codebooks, compare, edit, embedding, generate, guidance, learn, tokenize
+from playground.ui.rooms import codebooks, compare, edit, embedding, endless, generate, guidance, learn, tokenize
 from playground.ui.services import Services
 
 ROOMS: dict[str, Callable[[Services], None]] = {
@@ -12,6 +12,7 @@ ROOMS: dict[str, Callable[[Services], None]] = {
     "Generate": generate.room,
     "Guidance": guidance.room,
     "Edit": edit.room,
+    "Endless": endless.room,
     "Compare": compare.room,
     "Learn": learn.room,
 }

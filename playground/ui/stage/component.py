@@ -12,10 +12,12 @@ In a room:
                                             #   {"system", "scale" (1-based), "position" (0-based)} or None
     stage.span(on_span, None, ...)          # event.span: {"start", "stop"} (frames, stop not included) or None
     stage.pick_scale(on_scale, None, ...)   # event.scale: 1-based (keys 1-9) or None
+    stage.hungry(on_hungry, None, stage)    # a motion that grows (payload's growing) wants its next piece; event.have:
+                                            #   the frame that it begins with
 
 In a notebook: IPython.display.HTML(stage_frame(payload)), or stage_page(payload) for a whole page.
-In the browser: MotionStage.get(name) has setPayload, busy, fail, setGuidance, setScale, play, pause, seek, select,
-selectSpan, setSpanMode, getState, setState, snapshot, on, state. One name, one stage; stages in hidden tabs rest.
+In the browser: MotionStage.get(name) has setPayload, busy, fail, setGuidance, setScale, play, pause, finish, seek,
+select, selectSpan, setSpanMode, getState, setState, snapshot, on, state. One name, one stage; hidden ones rest.
 
 Links: getState() -> {frame, scale, mode, selection, span, speed}; on("state", listener) tells of it once it has come to
 rest, and so does the DOM event "motion-stage-state" with detail {name, state}. setState(part of it) puts it back and
@@ -39,7 +41,7 @@ _HERE = Path(__file__).parent
 _MODULES = (
     "decode", "guidance", "colour", "store", "dom", "camera", "skeleton", "floor", "paint", "labels", "lanes", "rows",
     "strips", "figures", "cells", "heads", "light", "cursor", "score", "brush", "timeline", "toolbar", "gestures",
-    "keys", "notices", "links", "pace", "snapshot", "remote", "surroundings", "stage", "index",
+    "keys", "notices", "links", "pace", "snapshot", "remote", "surroundings", "growth", "ribbon", "stage", "index",
 )  # fmt: skip
 # The first stage that is shown fetches the modules, once a page; with stage_script() in its head a page has them.
 _ON_LOAD = """
@@ -49,6 +51,7 @@ const start = () => {
     if (event === "select") trigger("select", { selection: detail });
     if (event === "span") trigger("span", { span: detail });
     if (event === "scale") trigger("pick_scale", { scale: detail.scale });
+    if (event === "hungry") trigger("hungry", detail);
   };
   const stage = MotionStage.mount(element.querySelector(".ms-host"), props.value || null, options);
   watch("value", () => stage.setPayload(props.value || null));

@@ -72,12 +72,16 @@ export function decodePayload(payload) {
     }
     return { ...figure, joints: positions, g: figure.g ?? null };
   });
+  const { growing = null, frames } = payload, origin = growing?.first ?? 0;
   return {
     fps: payload.fps,
-    frames: payload.frames,
+    frames: Math.max(frames, growing?.window ?? 0), // of the time axis
+    growing: growing && { ...growing, made: frames, pieces: [frames] },
+    origin, // the clock at the first frame
+    ribbon: payload.ribbon || [],
     skeleton: payload.skeleton,
     figures,
-    tracks: (payload.tracks || []).map((track) => ({ ...track, levels: track.levels.map(decodeLevel) })),
+    tracks: (payload.tracks || []).map((track) => ({ ...track, origin, levels: track.levels.map(decodeLevel) })),
     features: decodeFeatures(payload.features),
     badge: payload.badge || null,
     strips: (payload.strips || []).map(decodeStrip),

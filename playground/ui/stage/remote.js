@@ -29,6 +29,15 @@ export class Remote {
     this.play(false);
   }
 
+  // A motion that grew is whole now: the window that is there can be played and looked at like any other.
+  finish() {
+    const { data } = this;
+    this.pause();
+    if (!data?.growing) return;
+    this.data = { ...data, frames: data.growing.made, growing: null };
+    this.show(this.data, {});
+  }
+
   seek(frame) {
     this.store.seek(Number(frame));
   }

@@ -73,9 +73,9 @@ export function describeCell(tracks, { track: index, level, position }, fps) {
   const id = row.ids ? row.ids[position] : null;
   const lines = [
     [`${track.name}, scale ${level + 1}`, `token ${position + 1} of ${row.size}`],
-    [id === null ? "still to come" : `code ${id} of ${row.codes}`, between(...shareOf(track, level, position), fps)],
+    [id === null ? "still to come" : `code ${id} of ${row.codes}`, between(shareOf(track, level, position), track, fps)],
   ];
-  if (span) lines.push(["governs, as measured", between(span[2 * position], span[2 * position + 1], fps)]);
+  if (span) lines.push(["governs, as measured", between(span.subarray(2 * position, 2 * position + 2), track, fps)]);
   if (row.entropy) {
     const percent = `${Math.round(100 * doubtOf(row, position))} % of the most possible`;
     lines.push([`entropy ${row.entropy[position].toPrecision(2)} nats`, percent]);
@@ -98,6 +98,6 @@ export function told(value) {
   return String(Number(value.toPrecision(3)));
 }
 
-function between(from, to, fps) {
-  return `${(from / fps).toFixed(2)}–${(to / fps).toFixed(2)} s`;
+function between(frames, { origin = 0 }, fps) {
+  return `${Array.from(frames, (frame) => ((frame + origin) / fps).toFixed(2)).join("–")} s`;
 }

@@ -6,11 +6,13 @@ import { decodePayload } from "./decode.js";
 import { el } from "./dom.js";
 import { Figures } from "./figures.js";
 import { addGestures } from "./gestures.js";
+import { Hunger, joined, shifted } from "./growth.js";
 import { listenToKeys } from "./keys.js";
 import { watchState } from "./links.js";
 import { Notices } from "./notices.js";
 import { Pace } from "./pace.js";
 import { Remote } from "./remote.js";
+import { Ribbon } from "./ribbon.js";
 import { describeCell } from "./rows.js";
 import { MARGIN, Score } from "./score.js";
 import { COMMITS, createStore, locate } from "./store.js";
@@ -31,6 +33,7 @@ export class Stage extends Remote {
     this.camera = createCamera();
     this.data = null;
     this.pace = new Pace();
+    this.hunger = new Hunger();
     this.dirty = { layout: true, theme: true, still: true, cells: true, figures: true };
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.build(element);
@@ -48,7 +51,9 @@ export class Stage extends Remote {
     this.toolbar.element.append(badge); // in a corner of the picture, or among the controls on a phone
     this.timeline = new Timeline(this.store, () => this.data);
     this.score = new Score(this.store, { onView: (view) => this.setView(view) });
-    this.scorePart = el("div", { class: "ms-score ms" }, this.timeline.element, this.score.element);
+    this.ribbon = new Ribbon(this.store);
+    const score = [this.timeline.element, this.ribbon.element, this.score.element];
+    this.scorePart = el("div", { class: "ms-score ms" }, ...score);
     this.element = el(
       "section",
       { class: "ms is-empty", tabindex: "0", "aria-label": "Stage: figures and tokens. Space plays, arrows step." },
@@ -85,50 +90,62 @@ export class Stage extends Remote {
     this.element.dispatchEvent(new CustomEvent("motion-stage-state", { bubbles: true, detail }));
   }
 
-  // payload: object, JSON text, or null for the empty state. A message payload keeps the last result.
+  // payload: object, JSON text, or null for the empty state. A message payload keeps the last result, and a piece of a
+  // motion that grows joins it where it follows.
   setPayload(payload) {
+    let patch = null;
     try {
       const parsed = typeof payload === "string" && payload ? JSON.parse(payload) : payload;
       if (parsed?.state === "empty") return this.clear(parsed.message);
       if (parsed?.state) return this.say(parsed.state, parsed.message);
-      this.data = parsed ? decodePayload(parsed) : null;
+      const before = this.data, found = parsed ? decodePayload(parsed) : null;
+      if (found?.growing && before && !before.growing && before.scene === found.scene) return; // it has been ended
+      const { data, dropped } = found?.growing ? joined(before, found) : { data: found, dropped: null };
+      if (dropped !== null) patch = shifted(this.store.state, before.tracks, dropped);
+      this.data = data;
     } catch (error) {
       return this.say("error", error instanceof SyntaxError ? UNREADABLE : error.message);
     }
     if (!this.data) return this.clear();
     this.say("ready");
-    this.show(this.data);
+    this.show(this.data, patch);
   }
 
   clear(text = "") {
     this.data = null;
-    this.store.set({ playing: false, selection: null, span: null, hover: null, probe: null });
+    this.store.set({ playing: false, until: null, selection: null, span: null, hover: null, probe: null });
     this.figures.clear();
+    this.ribbon.element.hidden = true;
     this.toolbar.fitTo(null);
     this.notices.showBadge(null);
     this.say("empty", text);
     this.redraw("layout");
   }
 
-  show(data) {
+  // moved: what clock and selection become where the data has moved on, else null.
+  show(data, moved = null) {
     const first = !this.scene;
     const scene = data.scene ?? [data.frames, ...data.figures.map((figure) => figure.id)].join();
-    const patch = { frames: data.frames, fps: data.fps, hover: null, probe: null };
+    const { frames, fps, origin } = data, until = data.growing ? data.growing.made : null;
+    const patch = { frames, fps, origin, until, hover: null, probe: null, ...moved };
+    this.hunger.fed();
     if (data.features) patch.guidance = data.features.guidance;
     // The same scene told again (a re-decode, one more scale) goes on where it was; another one starts anew.
-    if (scene !== this.scene) Object.assign(patch, { frame: 0, selection: null, span: null });
+    if (scene !== this.scene || (data.growing && !moved)) Object.assign(patch, { frame: 0, selection: null, span: null });
     this.scene = scene;
     this.store.set(patch);
-    const wish = this.wished || this.options.wish?.();
+    const wish = data.growing ? null : this.wished || this.options.wish?.();
     if (wish) this.setState(wish);
     this.figures.setData(data);
     this.score.setData(data);
+    this.ribbon.setData(data);
     this.toolbar.fitTo(data);
     this.toolbar.show();
     this.notices.showBadge(data.badge);
     this.redraw("layout", "theme");
     const plays = (this.options.autoplay ?? true) && !this.calm.matches && wish?.frame === undefined;
-    if (first && plays) this.store.set({ playing: true });
+    const begins = data.growing && !moved;
+    if ((first || begins) && plays || (begins && data.growing.play)) this.store.set({ playing: true });
   }
 
   // "loading" and "error" keep the last result; "empty" and "ready" end both.
@@ -181,6 +198,8 @@ export class Stage extends Remote {
 
   advance(passed) {
     this.store.advance(Math.min(0.1, passed));
+    const have = this.hunger.watch(this.store.state, this.data?.growing, performance.now());
+    if (have !== null) this.options.onEvent?.("hungry", { have });
     if (this.pace.watch(passed)) this.dirty.layout = true;
   }
 
@@ -199,6 +218,7 @@ export class Stage extends Remote {
     this.figures.draw();
     this.timeline.move();
     this.score.move();
+    this.ribbon.move();
     this.toolbar.showReset(!this.camera.isHome());
     if (this.store.state.playing) this.score.reveal();
     for (const listener of this.frameListeners || []) listener(this.store.state.frame);
@@ -216,7 +236,9 @@ export class Stage extends Remote {
     const ratio = window.devicePixelRatio || 1, { figures, picture, options } = this;
     const wide = this.scorePart.clientWidth, scored = this.data && !this.score.element.hidden;
     if (this.data) this.score.resize(wide, ratio);
-    this.timeline.resize(wide, scored ? this.score.gutterWidth : 10, MARGIN, ratio);
+    const left = scored ? this.score.gutterWidth : 10;
+    this.timeline.resize(wide, left, MARGIN, ratio);
+    this.ribbon.resize(left, MARGIN);
     const crowd = picture.clientWidth < PHONE && figures.plan(picture.clientWidth, options.height).rows > 1;
     picture.style.height = `${Math.round(options.height * (crowd ? TALLER : 1))}px`;
     this.toolbar.element.classList.toggle("is-narrow", picture.clientWidth < ONE_LINE);

@@ -3,6 +3,8 @@
 const DEFAULTS = {
   frame: 0, // position on the time axis in frames, fractional while playing; 0 <= frame < frames
   frames: 1,
+  until: null, // frames that are there already where more are to come, else null
+  origin: 0, // what the clock says at frame 0, in frames
   fps: 20,
   playing: false,
   speed: 1,
@@ -47,11 +49,13 @@ export function createStore() {
   }
 
   function seek(frame) {
-    set({ frame: Math.min(Math.max(frame, 0), Math.max(state.frames - 1, 0)) });
+    set({ frame: Math.min(Math.max(frame, 0), Math.max((state.until ?? state.frames) - 1, 0)) });
   }
 
   // Moves the clock by real seconds; at the end it wraps round, or stops when loop is off. A span is played by itself.
+  // Where more is to come it waits at the end.
   function advance(seconds) {
+    if (state.until !== null) return seek(state.frame + seconds * state.fps * state.speed);
     const [start, stop] = state.span && state.loop ? state.span : [0, state.frames];
     let frame = state.frame + seconds * state.fps * state.speed;
     if (frame >= stop || frame < start) {

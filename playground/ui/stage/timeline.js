@@ -68,7 +68,7 @@ export class Timeline {
     const ctx = clear(this.canvas, this.ratio);
     this.drawRuler(ctx);
     ctx.fillStyle = css(theme.line);
-    rounded(ctx, left, BAR, width - left - right, THICK);
+    rounded(ctx, left, BAR, this.xOf(state.until ?? state.frames) - left, THICK);
     for (const [from, to] of data?.hatch || []) {
       const [x, end] = [this.xOf(from), this.xOf(to)];
       ctx.fillStyle = css(theme.line);
@@ -93,13 +93,14 @@ export class Timeline {
   drawRuler(ctx) {
     const { state } = this.store;
     const total = state.frames / state.fps, pixels = (this.width - this.left - this.right) / Math.max(total, 0.01);
+    const first = state.origin / state.fps;
     const every = [0.5, 1, 2, 5, 10].find((step) => step * pixels > 44) || 20;
     ctx.font = `11px ${this.theme.font}`;
     ctx.textAlign = "left";
     ctx.textBaseline = "alphabetic";
     ctx.fillStyle = css(this.theme.muted);
-    for (let s = 0; s <= total + 1e-6; s += every) {
-      const x = Math.round(this.xOf(s * state.fps)), text = `${s} s`;
+    for (let s = Math.ceil(first / every - 1e-6) * every; s <= first + total + 1e-6; s += every) {
+      const x = Math.round(this.xOf(s * state.fps - state.origin)), text = `${s} s`;
       if (x + ctx.measureText(text).width > this.width) break;
       ctx.fillText(text, x, 12);
     }
@@ -109,7 +110,7 @@ export class Timeline {
   drawPeek(frame) {
     this.peek.hidden = frame === null;
     if (frame === null) return;
-    this.peek.textContent = `${(frame / this.store.state.fps).toFixed(2)} s`;
+    this.peek.textContent = `${seconds(frame + this.store.state.origin, this.store.state.fps)} s`;
     const x = Math.min(Math.max(this.xOf(frame), 26), this.width - 26);
     this.peek.style.transform = `translateX(${x.toFixed(1)}px) translateX(-50%)`;
   }
@@ -117,7 +118,8 @@ export class Timeline {
   // The values that screen readers tell; not at every drawn frame while it plays, or they would never stop talking.
   tell() {
     const { state } = this.store;
-    const now = seconds(Math.floor(state.frame + 1e-6), state.fps), total = seconds(state.frames, state.fps);
+    const now = seconds(state.origin + Math.floor(state.frame + 1e-6), state.fps);
+    const total = seconds(state.origin + (state.until ?? state.frames), state.fps);
     if (this.told === now + total) return;
     this.told = now + total;
     this.slider.setAttribute("aria-valuemax", total);

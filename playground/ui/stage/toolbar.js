@@ -55,10 +55,11 @@ export class Toolbar {
     if (has("speed")) this.speeds.forEach((node, i) => press(node, SPEEDS[i] === state.speed));
     if (has("layout")) press(this.overlay, state.layout === "overlay");
     for (const [key, node] of Object.entries(this.toggles)) if (has(key)) press(node, state[key]);
-    if (has("frame", "frames", "fps")) {
-      this.now.textContent = seconds(Math.floor(state.frame + 1e-6), state.fps);
-      this.total.textContent = ` / ${seconds(state.frames, state.fps)} s`;
-      this.count.textContent = `frame ${Math.floor(state.frame + 1e-6)}`;
+    if (has("frame", "frames", "fps", "until", "origin")) {
+      const now = state.origin + Math.floor(state.frame + 1e-6);
+      this.now.textContent = seconds(now, state.fps);
+      this.total.textContent = ` / ${seconds(state.origin + (state.until ?? state.frames), state.fps)} s`;
+      this.count.textContent = `frame ${now}`;
     }
   }
 
@@ -69,6 +70,7 @@ export class Toolbar {
   // Controls without a meaning for this payload are not there.
   fitTo(data) {
     this.toggles.ghost.hidden = !data || !data.figures.some((figure) => figure.ghost_of);
+    this.toggles.loop.hidden = Boolean(data?.growing);
     this.overlay.hidden = !data || data.figures.length < 2;
     for (const node of this.element.querySelectorAll("button")) node.disabled = !data;
   }
@@ -87,7 +89,7 @@ function press(node, on) {
 
 export function togglePlay(store) {
   const { state } = store;
-  if (!state.playing && !state.loop && state.frame >= state.frames - 1) store.seek(0);
+  if (!state.playing && !state.loop && state.until === null && state.frame >= state.frames - 1) store.seek(0);
   store.set({ playing: !state.playing });
 }
 
