@@ -87,9 +87,9 @@ def _one(runtime: "Runtime", batch: ClipBatch, evaluator: "Evaluator | None", fo
     norm = quantized.residual_norm.double().numpy()
     found.energies.extend((norm / np.maximum(norm[0], 1e-12)).T.tolist())
     shares = quantized.per_level
-    for line, rows in enumerate(batch.rows):
-        count = tokenizer.sizes(rows)[-1]
-        found.moments.add(latent[line, :count].numpy(), shares[:, line, :count].numpy())
+    counts = [tokenizer.sizes(rows)[-1] for rows in batch.rows]
+    real = torch.arange(latent.shape[1])[None] < torch.tensor(counts)[:, None]
+    found.moments.add(latent[real].numpy(), shares[:, real].numpy())
     true = [from_features67(rows) for rows in batch.given]
     errors: list[list[float]] = [[] for _ in true]
     if evaluator is not None:
