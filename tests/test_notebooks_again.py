@@ -35,3 +35,8 @@ def test_a_stopwatch(library: Path) -> None:
     path = ROOT / "notebooks" / "lgtok_table9.ipynb"
     text = said(run(path, RECOMPUTE=True, LIBRARY=str(library), SYSTEMS=[SYSTEM], MOTIONS=1))
     assert "1 test clips of tiny" in text and "tokens to motion" in text
+
+
+def test_a_census(library: Path) -> None:
+    text = said(run(ROOT / "notebooks" / "snapmogen_table1.ipynb", RECOMPUTE=True, LIBRARY=str(library)))
+    assert "Ours: tiny" in text and "not counted yet" not in text and "20450" in text

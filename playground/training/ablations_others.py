@@ -218,10 +218,10 @@ def results(jobs: Sequence[Job], library: Library, evaluator: Evaluator | None) 
     return {"item": "ablations_others", "made_by": "make ablations-others", "provenance": provenance, "rows": rows}
 
 
-def measure_again(library: Path, out: Path = Path("runs/ablations-others")) -> dict[str, Any]:
+def measure_again(library: str | Path, out: Path = Path("runs/ablations-others")) -> dict[str, Any]:
     """What `results` gives for the trainings that are finished under `out`; nothing is trained, nothing is stored."""
     evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
-    return results(ablation_jobs(out), Library.open(library), evaluator)
+    return results(ablation_jobs(out), Library.open(Path(library)), evaluator)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
