@@ -74,6 +74,7 @@ def _generate(state: State) -> tuple[str, str]:
         "engine = default_engine()\n"
         + drawn(state, seed, takes)
         + "".join(f"made = engine.regenerate({changed(one)})\n" for one in read_changes(state["changes"]))
+        + ("made = engine.refine(made)  # standing feet slide less; the tokens stay\n" if state["plant"] else "")
         + TOKENS.format(name="made")
         + 'write_motion(made.motion, Path("generated.bvh"))\n'
     )

@@ -21,7 +21,9 @@ from playground.ui.services import Services
 from playground.ui.state import State
 from playground.ui.uploads import checked_number
 
-WISHES = ("prompt", "free", "seconds", "seed", "g", "s", "temperature", "topk", "topp", "takes")  # keys of CONTROLS
+WISHES = (  # keys of CONTROLS
+    "prompt", "free", "seconds", "seed", "g", "s", "temperature", "topk", "topp", "takes", "plant",
+)  # fmt: skip
 MADE = "made_"  # how the value of `motion` begins that stands for a generated motion
 MAX_NAME = 80  # characters of that value
 MAX_CHANGES = 6  # of one motion, one after the other; what the address has room for
@@ -41,6 +43,7 @@ class Wish:
     top_k: float
     top_p: float
     takes: int = 1  # motions side by side, with seeds seed, seed + 1, ...
+    plant: bool = False  # does the root refiner compute the way over the ground?
 
     @classmethod
     def checked(cls, prompt: object, free: object, *numbers: object) -> "Wish":
@@ -57,8 +60,9 @@ class Wish:
             ("the number of motions side by side", 1, LIMITS.max_seeds),
         )
         given = (*numbers, 1)[: len(bounds)]
+        plant = numbers[len(bounds) :] == (True,)
         sure = [checked_number(n, *bound) for n, bound in zip(given, bounds, strict=True)]
-        return cls(words, sure[0], int(sure[1]), sure[2], sure[3], sure[4], sure[5], sure[6], int(sure[7]))
+        return cls(words, sure[0], int(sure[1]), sure[2], sure[3], sure[4], sure[5], sure[6], int(sure[7]), plant)
 
     @property
     def seeds(self) -> tuple[int, ...]:
@@ -138,7 +142,7 @@ class Result:
         """Key of the table of controls -> value, as the room shows this result."""
         wish = self.wish
         own = (wish.prompt or "", wish.prompt is None, wish.seconds, wish.seed, wish.guidance, wish.cfg,
-               wish.temperature, wish.top_k, wish.top_p, wish.takes)  # fmt: skip
+               wish.temperature, wish.top_k, wish.top_p, wish.takes, wish.plant)  # fmt: skip
         return dict(zip(WISHES, own, strict=True))
 
 
@@ -222,7 +226,8 @@ def wish_values(services: Services, state: State) -> tuple[Any, ...]:
     """What the address of the room Generate asks for, in the order of `Wish.checked`."""
     own = services.sampling()
     usual = {"g": own.guidance, "s": own.cfg, "temperature": own.temperature, "topk": own.top_k, "topp": own.top_p}
-    return tuple(state.values.get(key, usual.get(key, state[key])) for key in WISHES)
+    values = {key: state.values.get(key, usual.get(key, state[key])) for key in WISHES}
+    return tuple((values | {"plant": values["plant"] and services.refines()}).values())
 
 
 def made_name(wish: Wish, seed: int, changes: Sequence[Change] = ()) -> str:
@@ -267,7 +272,8 @@ def last_of(drawings: Iterator[Drawing]) -> Result:
 
 def _finish(services: Services, wish: Wish, seconds: float, step: GenerationStep, seed: int) -> Generation:
     system = services.default_system().name
-    return Generation(
+    made = Generation(
         system, services.checkpoint(system), wish.prompt or "", seed, step.levels, step.entropy, step.motion,
         step.features, seconds, wish.sampling,
     )  # fmt: skip
+    return services.engine().refine(made) if wish.plant else made

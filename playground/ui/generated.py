@@ -27,7 +27,8 @@ Made = GenerationStep | Generation
 
 def drawing_view(services: Services, drawing: Drawing, take: int = 0) -> View:
     """A run on its way, or at its end; `take` is the motion whose tokens the score shows."""
-    return _view(services, drawing.steps, drawing.wish, drawing.before, take, drawing.seconds)
+    made = drawing.steps if drawing.result is None else drawing.result.takes
+    return _view(services, made, drawing.wish, drawing.before, take, drawing.seconds)
 
 
 def result_view(services: Services, result: Result, take: int = 0) -> View:

@@ -123,6 +123,10 @@ class Services:
             self._bundles[system] = read_bundle(self.engine().assets / "analysis", system)
         return self._bundles[system]
 
+    def refines(self) -> bool:
+        """Whether a root refiner is shipped."""
+        return self.engine().refines
+
     def sampling(self) -> SamplingDefaults:
         """How the default system generates where nothing else is asked for."""
         try:

@@ -99,6 +99,7 @@ CONTROLS: tuple[Control, ...] = (
     Control("topk", "generate", "number", None, "Top-k, share of codes", 0.01, 1, element="generate-topk"),
     Control("topp", "generate", "number", None, "Top-p, share of odds", 0.05, 1, element="generate-topp"),
     Control("takes", "generate", "whole", 1, "Side by side", 1, LIMITS.max_seeds, element="generate-takes"),
+    Control("plant", "generate", "flag", False, "Plant the feet", element="generate-plant"),
     Control("take", "generate", "whole", 0, "Tokens of", 0, LIMITS.max_seeds - 1, element="generate-take"),
     Control("changes", "generate", "name", None, "Changes to the motion"),
     *_of_stage("guidance", "guidance"),

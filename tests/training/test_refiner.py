@@ -6,16 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from safetensors.torch import load_file
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
 
 from playground.checkpoints import load_model
 from playground.data.batches import BatchConfig
 from playground.data.library import Library, LibraryClip, write_library
+from playground.engine import Engine
+from playground.errors import PlaygroundError
 from playground.generators.refiner import ROOT, RefinerConfig, RootRefiner, build_refiner
 from playground.motion.measures import foot_sliding
 from playground.motion.representation import from_features67, to_features67
 from playground.motion.synthetic import corpus
-from playground.training import configs, run
+from playground.training import configs, run, ship
 from playground.training.configs import RefinerTraining, Schedule
 from playground.training.loop import Launch
 from playground.training.refiner import perturbed, root_figures, smoothed
@@ -82,6 +85,25 @@ def test_a_few_dozen_steps_lower_the_error_and_a_killed_run_goes_on_as_if_it_had
     for key, value in figures[0].items():
         mean = np.nanmean([figure[key] for figure in figures])
         assert last[f"val_{key}"] == pytest.approx(mean, rel=0.05, abs=0.05), (key, value)  # half precision on disk
+
+
+def test_shipping_puts_it_where_the_engine_looks(library, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(configs.REFINERS, "tiny-refiner", replace(TRAINING, schedule=replace(PLAN, steps=1)))
+    assets = tmp_path / "assets"
+    with pytest.raises(PlaygroundError, match="train root-refiner into"):
+        ship.ship_refiner(tmp_path / "out", assets)
+    train(library, tmp_path / "out")
+    assert not Engine(assets).refines
+    assert ship.main([str(tmp_path / "out"), "--refiner", "--assets", str(assets)]) == 0
+    assert "step 1" in capsys.readouterr().out and Engine(assets).refines
+    assert Engine(assets).refiner().checkpoint == shipped(tmp_path / "out")[1].hash[:12]
+    saved = tmp_path / "out" / "refiner" / "checkpoint.safetensors"
+    with safe_open(saved, framework="pt") as file:
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        metadata = file.metadata()
+    save_file({name: value.float() for name, value in tensors.items()}, saved, metadata)
+    with pytest.raises(PlaygroundError, match="is shipped is float16"):
+        ship.ship_refiner(tmp_path / "out", assets)
 
 
 def test_root_figures_are_those_of_the_recovered_motion():

@@ -35,6 +35,12 @@ class Drawing:
         made = (last.levels, last.entropy, last.motion, last.features)
         return Generation(system, "fake", prompt or "", seed, *made, 0.1)
 
+    refines = True
+
+    def refine(self, made: Generation) -> Generation:
+        self.calls.append("refine")
+        return replace(made, motion=_moved(made.motion, 0.5), refiner="fake")
+
     def alternatives(self, result: Any, scale: int, position: int, count: int = 8) -> Alternatives:
         self.calls.append(f"alternatives {scale} {position}")
         level = result.levels[scale - 1]

@@ -1,8 +1,10 @@
 """What Generate keeps: changes in an address, several seeds, a token forced, the visit's history, names of motions."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import gradio as gr
 import numpy as np
 import pytest
 from hypothesis import given
@@ -21,13 +23,15 @@ from playground.ui.drawing import (
     made_again,
     made_name,
     read_changes,
+    wish_values,
     write_changes,
 )
 from playground.ui.errors import Noted
-from playground.ui.generated import earlier, onward, result_view, token_card
-from playground.ui.rooms.generate import SHOWN, Handlers
+from playground.ui.generated import drawing_view, earlier, onward, result_view, token_card
+from playground.ui.rooms.generate import SHOWN, Handlers, _controls
 from playground.ui.services import Services
 from playground.ui.state import State, parse, query
+from playground.ui.view import View
 from tests.ui.double import SIZES, FakeEngine
 
 NUMBERS: tuple[Any, ...] = (4.0, 3, 2.0, 4.0, 1.0, 0.2, 0.95)
@@ -74,6 +78,36 @@ def test_seeds_stand_side_by_side_in_one_batch(services: Services) -> None:
     assert [figure["name"] for figure in view.stage["figures"]] == ["Seed 3", "Seed 4", "Seed 5"]
     assert "seed 4" in view.stage["tracks"][0]["name"] and len(view.stage["tracks"]) == 1
     assert [bool(figure["caption"]) for figure in view.stage["figures"]] == [False, True, False]
+
+
+def test_planted_feet_change_the_motion_and_leave_the_tokens(services: Services) -> None:
+    plain, asked = last_of(draw(services, wish())), Wish.checked("a person sits", False, *NUMBERS, 1, True)
+    *_, last = draw(services, asked)
+    assert last.result is not None and asked.plant and not wish().plant
+    (made,) = last.result.takes
+    assert made.refiner == "fake" and services.engine().calls.count("refine") == 1  # type: ignore[attr-defined]
+    for level, same in zip(made.levels, plain.takes[0].levels, strict=True):
+        assert np.array_equal(level.ids, same.ids)
+    shown, unplanted = (drawing_view(services, one).stage for one in (last, replace(last, result=plain)))
+    assert shown["figures"] != unplanted["figures"]
+    again = last_of(change(services, last.result, 0, Change(2, seed=9)))
+    assert again.takes[0].refiner == "fake" and again.address["plant"] is True
+
+
+def test_a_link_plants_feet_where_there_is_a_refiner(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+    state = parse("?room=generate&prompt=a+person+sits&plant=1")
+    assert state["plant"] is True and "plant=1" in query(state)
+    assert Wish.checked(*wish_values(services, state)).plant
+    monkeypatch.setattr(FakeEngine, "refines", False)
+    assert not Wish.checked(*wish_values(services, state)).plant
+
+
+def test_the_switch_stands_in_the_room_where_there_is_a_refiner() -> None:
+    for there in (True, False):
+        with gr.Blocks():
+            *_, plant, _ = _controls(View(stage={}), there)
+        assert plant.visible is there and plant.value is False
+        assert plant.label == "Plant the feet" and "tokens stay the same" in plant.info
 
 
 def test_the_last_seeds_there_are_stay_within_the_limit() -> None:

@@ -48,6 +48,10 @@ GUIDANCES = (
     "Two guidances: <b>s</b> acts while tokens are chosen and makes them follow the words; <b>g</b> leaves the tokens "
     "as they are and changes how they are read."
 )
+PLANT = (
+    "The way over the ground is computed anew from how the body moves, so that standing feet slide less; the tokens "
+    "stay the same."
+)
 STEPS = (0.1, 0.1, 0.05, 0.01, 0.01)  # of the sampling sliders
 KEEP = "(changes, take) => window.mtpState?.keep('generate', ['changes', 'take'], [changes || null, +take || null])"
 SKIP = gr.skip()
@@ -199,7 +203,7 @@ def room(services: Services) -> None:
         with panel("Words become a motion", LEAD, compare=True):
             card = inspector(elem_id="generate-token")
             with gr.Column(elem_classes=["mtp-form"], min_width=0):
-                prompt, seconds, seed, takes, buttons = _controls(opening)
+                prompt, seconds, seed, takes, plant, buttons = _controls(opening, services.refines())
             which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="generate-take",
                              elem_classes=["mtp-segments"])  # fmt: skip
             message = message_place("generate-message")
@@ -210,7 +214,7 @@ def room(services: Services) -> None:
         words(NAME)
         door = link_door(NAME)
         changes = gr.Textbox("", elem_classes=["mtp-unseen"], show_label=False, container=False)
-    wishes = [prompt, free, seconds, seed, *numbers, takes]
+    wishes = [prompt, free, seconds, seed, *numbers, takes, plant]
     shown = [stage, facts, further, shelf, which, changes, card, *wishes]
     _wire(Handlers(services), visit, message, shown, buttons, door)
 
@@ -245,8 +249,9 @@ def _wire(do: Handlers, visit: Any, message: Any, shown: list[Any], buttons: lis
     commits(NAME, keys, again.then, back.then)
 
 
-def _controls(opening: View) -> tuple[Any, ...]:
-    """The controls from top to bottom: prompt, seconds, seed, seeds side by side, "Generate" and "Stop"."""
+def _controls(opening: View, refines: bool) -> tuple[Any, ...]:
+    """From top to bottom: prompt, seconds, seed, seeds side by side, "Plant the feet" if there is a root refiner,
+    "Generate" and "Stop"."""
     prompt = gr.Textbox(
         opening.controls.get("prompt", PROMPTS[0]), label="Prompt", lines=2, max_lines=3,
         placeholder=PROMPTS[0], elem_id="generate-prompt",
@@ -265,10 +270,13 @@ def _controls(opening: View) -> tuple[Any, ...]:
             1, label=control(NAME, "takes").label, precision=0, minimum=1, maximum=LIMITS.max_seeds,
             elem_id="generate-takes", min_width=96, scale=0,
         )  # fmt: skip
+    plant = gr.Checkbox(
+        False, label=control(NAME, "plant").label, info=PLANT, visible=refines, elem_id="generate-plant"
+    )
     with gr.Row(elem_classes=["mtp-line"]):
         go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
         cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
-    return prompt, seconds, seed, takes, [go, cancel]
+    return prompt, seconds, seed, takes, plant, [go, cancel]
 
 
 def _knobs(default: SamplingDefaults) -> list[Any]:
