@@ -137,11 +137,11 @@ def opening(services: Services, prompts: Sequence[str], seconds: int) -> View:
         parts += [session.advance(PIECE).joints for _ in range(seconds)]
     joints = np.concatenate(parts)
     block = payload(services, joints, session.levels(0, len(joints)), said, "endless, opening")
-    return _view(block, session.seams(), then=write_plan(said[1:]))
+    return _view(block, session.seams())
 
 
-def _view(block: scene.Json, seams: "Seams", **controls: str) -> View:
-    return View(stage=block, facts=seam_facts(seams), controls={"switches": switches_html(seams), **controls})
+def _view(block: scene.Json, seams: "Seams") -> View:
+    return View(stage=block, facts=seam_facts(seams), controls={"switches": switches_html(seams)})
 
 
 def seam_facts(seams: "Seams") -> tuple[Fact, ...]:

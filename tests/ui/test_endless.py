@@ -17,7 +17,7 @@ from playground.text.rewriting import rewrite
 from playground.ui.code import python_for
 from playground.ui.complete import complete
 from playground.ui.rewriting import RULES, rewritten_card, who
-from playground.ui.rooms.endless import NAME, Handlers, opening_view
+from playground.ui.rooms.endless import NAME, OPENING, Handlers, opening_view
 from playground.ui.services import Services
 from playground.ui.state import parse
 from playground.ui.walking import WINDOW, Said, Walk, clean, plan_of_steps, read_plan, write_plan
@@ -119,7 +119,7 @@ def test_without_the_system_the_room_says_which_command_trains_it(services: Serv
 def test_the_opening_is_one_motion_with_its_switch(services: Services) -> None:
     view = opening_view(services)
     assert view.stage["frames"] == 200 and view.stage["growing"] is None and len(view.stage["ribbon"]) == 2
-    assert read_plan(view.controls["then"]) == [Said(*view.stage["ribbon"][1])]
+    assert [words for _, words in view.stage["ribbon"]] == list(OPENING)
     assert "The newest of 1 switches" in view.controls["switches"] and "checkpoint fake" in view.facts[0].card
 
 

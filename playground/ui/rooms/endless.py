@@ -108,7 +108,7 @@ def room(services: Services) -> None:
             heard = message_place("endless-heard")
             message = message_place("endless-message")
             facts = gr.HTML(_told(shown), elem_id="endless-facts", apply_default_css=False)
-            seed, then = _more(str(shown.controls.get("then", "")))
+            seed, then = _more()
             rewriter(NAME, prompt, (STEPS, plan_of_steps, then))
         words(NAME)
         door = link_door(NAME)
@@ -151,13 +151,13 @@ def _prompt() -> tuple[Any, list[Any]]:
     return prompt, [start, say, stop]
 
 
-def _more(plan: str) -> tuple[Any, Any]:
+def _more() -> tuple[Any, Any]:
     """The seed, and the instructions that follow by themselves."""
     with gr.Row(elem_classes=["mtp-line"]):
         row = control(NAME, "seed")
         seed = gr.Number(row.default, label=row.label, precision=0, minimum=0, maximum=LIMITS.max_seed,
                          elem_id=row.element, min_width=72, scale=0)  # fmt: skip
         row = control(NAME, "then")
-        then = gr.Textbox(plan, label=row.label, max_lines=1, elem_id=row.element, min_width=160,
+        then = gr.Textbox("", label=row.label, max_lines=1, elem_id=row.element, min_width=160,
                           placeholder="4 a person jumps | 8 a person sits down")  # fmt: skip
     return seed, then

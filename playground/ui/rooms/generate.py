@@ -29,6 +29,7 @@ from playground.ui.generated import drawing_view, earlier, onward, result_view, 
 from playground.ui.inspector import inspector
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import asked, commits, link_door
+from playground.ui.rewriting import rewriter
 from playground.ui.services import Services
 from playground.ui.stage.component import stage_call
 from playground.ui.state import control
@@ -211,6 +212,7 @@ def room(services: Services) -> None:
             further = gr.HTML("", elem_id="generate-onward", apply_default_css=False)
             shelf = inspector(elem_id="generate-earlier")
             free, *numbers = _knobs(services.sampling())
+            rewriter(NAME, prompt)
         words(NAME)
         door = link_door(NAME)
         changes = gr.Textbox("", elem_classes=["mtp-unseen"], show_label=False, container=False)
