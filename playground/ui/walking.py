@@ -165,7 +165,8 @@ def switches_html(seams: "Seams") -> str:
     ]
     if not rows:
         return ""
-    return table(["Instruction", "from, s", "jerk, m/s³"], rows, f"The newest of {seams.count} switches")
+    told = f"The newest {len(rows)} of {seams.count} switches" if seams.count > len(rows) else "Switches, newest first"
+    return table(["Instruction", "from, s", "jerk, m/s³"], rows, told)
 
 
 def clean(prompt: str) -> str:

@@ -1,5 +1,6 @@
 """Generate as a visitor uses it: tokens looked into and forced, seeds side by side, the visit's list, links, stop."""
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -94,3 +95,17 @@ def test_six_seeds_and_a_long_visit_leave_the_score_in_sight(visit: Go, stand_in
     expect(page.locator("#generate-temperature")).to_be_visible()
     score = page.locator("#generate-score .ms-roll").bounding_box()
     assert score is not None and score["y"] + score["height"] <= DESKTOP["height"]
+
+
+def test_a_prompt_is_rewritten_and_a_version_used(seen: Visit) -> None:
+    page = seen.page
+    seen.wake("#generate-go")
+    prompt = page.locator("#generate-prompt").locator("input, textarea")
+    page.get_by_role("tabpanel").get_by_role("button", name="Rewrite the prompt").click()
+    prompt.fill("could you show a guy walking slowly and then jumping")
+    page.locator("#generate-rewrite-go").click()
+    card = page.locator("#generate-rewritten")
+    expect(card.locator("ol li")).to_have_count(2)
+    expect(card).to_contain_text("Why")
+    card.get_by_role("button", name="Use").nth(1).click()
+    expect(prompt).to_have_value(re.compile("walks slowly, then jumps"))

@@ -120,7 +120,7 @@ def test_the_opening_is_one_motion_with_its_switch(services: Services) -> None:
     view = opening_view(services)
     assert view.stage["frames"] == 200 and view.stage["growing"] is None and len(view.stage["ribbon"]) == 2
     assert [words for _, words in view.stage["ribbon"]] == list(OPENING)
-    assert "The newest of 1 switches" in view.controls["switches"] and "checkpoint fake" in view.facts[0].card
+    assert "Switches, newest first" in view.controls["switches"] and "checkpoint fake" in view.facts[0].card
 
 
 SPOKEN = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=30).map(clean)

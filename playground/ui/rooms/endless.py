@@ -145,9 +145,11 @@ def _prompt() -> tuple[Any, list[Any]]:
     )  # fmt: skip
     gr.Examples([[text] for text in PROMPTS], [prompt], label="Try one of these", elem_id="endless-examples")
     with gr.Row(elem_classes=["mtp-line"]):
-        start = gr.Button("Start", variant="primary", size="sm", elem_id="endless-go")
-        say = gr.Button("Say", variant="primary", size="sm", interactive=False, elem_id="endless-say")
-        stop = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="endless-stop")
+        start = gr.Button("Start", variant="primary", size="sm", min_width=88, elem_id="endless-go")
+        say = gr.Button("Say", variant="primary", size="sm", interactive=False, min_width=64, elem_id="endless-say")
+        stop = gr.Button(
+            "Stop", variant="secondary", size="sm", interactive=False, min_width=64, elem_id="endless-stop"
+        )
     return prompt, [start, say, stop]
 
 
