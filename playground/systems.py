@@ -6,6 +6,7 @@
 import json
 import struct
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -199,7 +200,10 @@ def checkpoint_path(assets: Path, name: str, part: str) -> Path:
 def row_of(name: str) -> SystemRow:
     """A row of the table. PlaygroundError for an unknown name."""
     if name not in SYSTEMS:
-        raise PlaygroundError(f"unknown system {str(name)[:80]!r}; one of {', '.join(SYSTEMS)} is accepted")
+        near = get_close_matches(str(name)[:80], SYSTEMS, 3) or list(SYSTEMS)[:3]
+        raise PlaygroundError(
+            f"unknown system {str(name)[:80]!r}; {', '.join(near)} and others are accepted, the systems command lists them"
+        )
     return SYSTEMS[name]
 
 
