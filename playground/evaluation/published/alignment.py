@@ -90,7 +90,7 @@ def attention_of(engine: Engine, made: Generation, prompt: str) -> tuple[str, li
             weights = reads(Tokens(ids, tuple(level.codes for level in made.levels)), text, lengths)[0]
             what = "last layer of the generator, mean over heads"
     except ValueError:
-        raise PlaygroundError(f"the system {made.system} reads the text as a whole, not word by word") from None
+        raise PlaygroundError(f"the system {made.system} has no attention to single words to look at") from None
     words = text.words[0]
     return what, list(words), weights[:, : len(words)].double().numpy()
 
