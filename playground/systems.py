@@ -202,7 +202,7 @@ def row_of(name: str) -> SystemRow:
     if name not in SYSTEMS:
         near = get_close_matches(str(name)[:80], SYSTEMS, 3) or list(SYSTEMS)[:3]
         raise PlaygroundError(
-            f"unknown system {str(name)[:80]!r}; {', '.join(near)} and others are accepted, the systems command lists them"
+            f"unknown system {str(name)[:80]!r}; {', '.join(near)} and others are accepted, see the systems command"
         )
     return SYSTEMS[name]
 
