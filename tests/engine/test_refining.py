@@ -6,30 +6,17 @@ import numpy as np
 import pytest
 import torch
 
-from playground.checkpoints import Card, save_checkpoint
-from playground.engine import Engine
 from playground.engine.refining import ABSENT, open_refiner, refiner_path
 from playground.errors import PlaygroundError
-from playground.generators.refiner import RefinerConfig, RootRefiner
 from playground.motion.representation import from_features67
-from playground.training.refiner import NO_TEXT
-
-
-def write_refiner(engine: Engine, normaliser) -> RootRefiner:
-    with torch.random.fork_rng():
-        torch.manual_seed(3)
-        network = RootRefiner(RefinerConfig(width=8, blocks=2)).eval().requires_grad_(False)
-    facts = {"step": 0, "seconds": 0.0}
-    card = Card("refiner", network.config, NO_TEXT, "tiny library", facts, normaliser)
-    save_checkpoint(refiner_path(engine.assets), network, card, torch.float32)
-    return network
+from tests.tiny import tiny_refiner
 
 
 @pytest.fixture
 def refining(engine):
     """The tiny engine with a refiner, which is gone afterwards, and its network."""
     normaliser = engine.runtime("lgtok-lite").normaliser
-    network = write_refiner(engine, replace(normaliser, mean=normaliser.mean + 0.01, std=normaliser.std * 2))
+    network = tiny_refiner(engine.assets, replace(normaliser, mean=normaliser.mean + 0.01, std=normaliser.std * 2))
     yield engine, network
     refiner_path(engine.assets).unlink()
 

@@ -10,6 +10,8 @@ import pytest
 
 from playground.data.library import Library
 from playground.engine import Engine
+from playground.engine.refining import refiner_path
+from playground.errors import PlaygroundError
 from playground.evaluation import items as drawing
 from playground.evaluation import metrics
 from playground.evaluation.items import Item, draw_items, draw_samples, portions, prompt_items, stream
@@ -23,6 +25,7 @@ from playground.motion.representation import from_features67
 from playground.systems import checkpoint_path, row_of
 from tests.analysis.tiny import CODES, SYSTEM, tiny_assets, tiny_library
 from tests.evaluation.tiny import tiny_evaluator
+from tests.tiny import tiny_refiner
 
 EVALUATORS = {"tmr": tiny_evaluator("tmr"), "clip": tiny_evaluator("clip")}
 SMALL = Order(repeats=2, mm_texts=1, mm_samples=10, evaluators=EVALUATORS)
@@ -160,6 +163,27 @@ def test_generated_and_recorded_motions_equal_a_loop_over_single_ones(place: Pla
     assert result["real"]["bone_drift"]["mean"] == pytest.approx(np.mean(slow["real"]), rel=1e-6)
     assert result["real"]["fid"]["mean"] == pytest.approx(np.mean(slow["again"]), rel=1e-3, abs=1e-7)
     assert result["metrics"]["mm_dist"]["n"] == 4 and result["metrics"]["fid"]["n"] == 5
+
+
+def test_refined_motions_are_measured_as_the_refiner_leaves_them(place: Place, result: dict) -> None:
+    engine, library = place
+    order = replace(SMALL, repeats=1, mm_samples=0, refine=True)
+    with pytest.raises(PlaygroundError, match="no root refiner"):
+        run(place, order)
+    with pytest.raises(PlaygroundError, match="--repeats 1"):
+        replace(order, repeats=0).check()
+    tiny_refiner(engine.assets, engine.runtime(SYSTEM).normaliser)
+    refiner = engine.refiner()
+    measured = run(place, order)
+    refiner_path(engine.assets).unlink()
+    assert measured["refiner"] == refiner.checkpoint and "refiner" not in result
+    made = [engine_rows(engine, item) for item in items_of(library, 0)]
+    pairs = [[from_features67(rows) for rows in (one, refiner.rows([one])[0])] for one in made]
+    drifts = [np.linalg.norm((a - b)[:, 0, ::2], axis=1).mean() for a, b in pairs]
+    metrics = measured["metrics"]
+    assert metrics["path_drift"]["mean"] == pytest.approx(np.mean(drifts), rel=1e-2) and metrics["path_drift"]["n"] == 5
+    assert metrics["foot_sliding"]["mean"] == pytest.approx(np.nanmean([foot_sliding(b) for _, b in pairs]), rel=1e-2)
+    assert all("path_drift" not in result[table] for table in TABLES) and "path_drift" not in measured["real"]
 
 
 def test_tokens_equal_a_loop_over_single_motions(place: Place, result: dict) -> None:

@@ -95,6 +95,15 @@ def test_generate(services: Services, tmp_path: Path, monkeypatch: pytest.Monkey
     assert (tmp_path / "generated.bvh").stat().st_size > 1_000
 
 
+def test_generate_plants_feet_where_the_switch_says_so() -> None:
+    given = {"prompt": "a person sits", "g": 0, "s": 4, "temperature": 1, "topk": 0.5, "topp": 0.5}
+    given |= {"system": ("lgtok-lite",)}
+    code = python_for("generate", State("generate", {**given, "seed": 1, "seconds": 2.0, "plant": True}))
+    assert code.count("made = engine.refine(made)") == 1
+    assert code.index("engine.generate(") < code.index("engine.refine(") < code.index("write_motion(made.motion")
+    assert "refine" not in python_for("generate", State("generate", {**given, "seed": 1, "seconds": 2.0}))
+
+
 def test_generate_without_a_prompt(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, left = run(services, "?room=generate&free=1&seconds=2&seed=3", tmp_path, monkeypatch)
     assert ids(left["made"].levels) == ids(default_engine().generate(None, 2.0, "lgtok-lite", seed=3).levels)
