@@ -234,29 +234,13 @@ def payload(
 
     PlaygroundError if figures are none or too many, ids repeat or point nowhere, spans are not in order.
     """
-    ids = [block["id"] for block in figures]
-    if not 1 <= len(ids) <= LIMITS.max_figures:
-        raise PlaygroundError(f"a stage shows 1 to {LIMITS.max_figures} figures, got {len(ids)}")
-    if len(set(ids)) != len(ids):
-        raise PlaygroundError("two figures of one stage have the same id")
-    for block in figures:
-        if block["ghost_of"] is not None and block["ghost_of"] not in ids:
-            raise PlaygroundError(
-                f'the ghost of figure "{block["id"]}" is to be "{block["ghost_of"]}", which is not there'
-            )
-        if block["g"] is not None and features is None:
-            raise PlaygroundError(f'figure "{block["id"]}" follows the guidance, but the stage has no features')
-    if features is not None and features["figure"] not in ids:
-        raise PlaygroundError(f'the features belong to figure "{features["figure"]}", which is not there')
+    _check_figures(figures, features)
     longest = max(block["frames"] for block in (*figures, *tracks))
     if len({block["id"] for block in strips}) != len(strips):
         raise PlaygroundError("two strips of one stage have the same id")
     edges = [edge for span in hatch for edge in span]
-    if (
-        any(len(span) != 2 for span in hatch)
-        or edges != sorted(set(edges))
-        or any(not 0 <= e <= longest for e in edges)
-    ):
+    apart = all(len(span) == 2 for span in hatch) and edges == sorted(set(edges))
+    if not apart or any(not 0 <= edge <= longest for edge in edges):
         raise PlaygroundError(f"hatched spans must be (first, last+1) in order and apart, within 0..{longest}")
     starts = [start for start, _ in ribbon]
     if starts != sorted(set(starts)):
@@ -277,6 +261,24 @@ def payload(
         "growing": growing,
         "ribbon": [[int(start), text] for start, text in ribbon],
     }
+
+
+def _check_figures(figures: Sequence[Json], features: Json | None) -> None:
+    """PlaygroundError where figures or features cannot stand on one stage."""
+    ids = [block["id"] for block in figures]
+    if not 1 <= len(ids) <= LIMITS.max_figures:
+        raise PlaygroundError(f"a stage shows 1 to {LIMITS.max_figures} figures, got {len(ids)}")
+    if len(set(ids)) != len(ids):
+        raise PlaygroundError("two figures of one stage have the same id")
+    for block in figures:
+        if block["ghost_of"] is not None and block["ghost_of"] not in ids:
+            raise PlaygroundError(
+                f'the ghost of figure "{block["id"]}" is to be "{block["ghost_of"]}", which is not there'
+            )
+        if block["g"] is not None and features is None:
+            raise PlaygroundError(f'figure "{block["id"]}" follows the guidance, but the stage has no features')
+    if features is not None and features["figure"] not in ids:
+        raise PlaygroundError(f'the features belong to figure "{features["figure"]}", which is not there')
 
 
 def message(state: str, text: str) -> Json:
