@@ -118,6 +118,7 @@ def parser() -> argparse.ArgumentParser:
 
     _for_models(command)
     _for_data(command)
+    _for_training(command)
     return top
 
 
@@ -164,7 +165,7 @@ def _for_models(command: Command) -> None:
 
 
 def _for_data(command: Command) -> None:
-    """prepare, segment, snapmogen, convert, train, evaluate, bench."""
+    """prepare, segment, snapmogen, convert."""
     sub = command("prepare", inputs.prepare, "published motion data to a library")
     sub.add_argument("source", metavar="SOURCE", help=SOURCES)
     sub.add_argument("root", metavar="ROOT", nargs="?", type=Path, help="the folder of the data; none for deepmimic")
@@ -190,8 +191,11 @@ def _for_data(command: Command) -> None:
     sub.add_argument("--llama", metavar="DIR", help="folder of LLaMA-3.2-1B, to note which weights are meant")
     sub.add_argument("--clip", metavar="DIR", help="folder of CLIP ViT-B/32, likewise")
 
-    sub = command("train", commands.train, "train a tokenizer or a generator")
-    sub.add_argument("config", metavar="CONFIG", help="a named training run, such as lgtok-lite-tokenizer")
+
+def _for_training(command: Command) -> None:
+    """train, evaluate, bench."""
+    sub = command("train", commands.train, "train a tokenizer, a generator, a refit, an evaluator or the root refiner")
+    sub.add_argument("config", metavar="CONFIG", help="a named run, such as lgtok-lite-tokenizer or tmr-evaluator")
     sub.add_argument("--library", type=Path, required=True, metavar="DIR")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="checkpoints and logs")
     sub.add_argument("--resume", action="store_true", help="go on from the last checkpoint in --out, if there is one")
