@@ -18,7 +18,7 @@ from playground.errors import PlaygroundError
 from playground.generators.base import FeatureGenerator, Generator, Step
 from playground.motion.representation import Normaliser
 from playground.nn.sampling import Sampling
-from playground.systems import SystemRow, checkpoint_path, row_of
+from playground.systems import SystemRow, check_here, checkpoint_path, row_of
 from playground.text.encoders import CachedEncoder, TextFeatures, check_same, load_encoder
 from playground.tokenizers.base import Tokenizer, Tokens
 from playground.tokenizers.token_file import LevelTokens
@@ -227,8 +227,7 @@ def load_runtime(assets: Path, row: SystemRow) -> Runtime:
     """Load a system's files. PlaygroundError if they are absent, broken, or made for another text encoder."""
     torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS") or os.cpu_count() or 1))
     paths = {part: checkpoint_path(assets, row.name, part) for part in row.parts}
-    if not all(paths[part].is_file() for part in row.needed):
-        raise PlaygroundError(row.absent)
+    check_here(assets, row)
     tokenizer, network = None, None
     cards: dict[str, Card] = {}
     if row.tokenizer is not None:

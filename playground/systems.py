@@ -197,6 +197,12 @@ def checkpoint_path(assets: Path, name: str, part: str) -> Path:
     return assets / "checkpoints" / owner / f"{part}.safetensors"
 
 
+def check_here(assets: Path, row: SystemRow) -> None:
+    """PlaygroundError where a file that the system needs is absent."""
+    if not all(checkpoint_path(assets, row.name, part).is_file() for part in row.needed):
+        raise PlaygroundError(row.absent)
+
+
 def row_of(name: str) -> SystemRow:
     """A row of the table. PlaygroundError for an unknown name."""
     if name not in SYSTEMS:

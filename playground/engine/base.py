@@ -22,7 +22,7 @@ from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
 from playground.motion.representation import from_features67
 from playground.results import Decoded, Example, Generation, GenerationStep, GuidancePair, Tokenized
-from playground.systems import SYSTEMS, SystemInfo, checkpoint_path, describe, header, row_of
+from playground.systems import SYSTEMS, SystemInfo, check_here, checkpoint_path, describe, header, row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 
@@ -84,6 +84,7 @@ class BaseEngine:
         row = row_of(system)
         with self._lock:
             if system not in self._runtimes:
+                check_here(self.assets, row)  # before torch is loaded
                 from playground.runtime import load_runtime
 
                 self._runtimes[system] = load_runtime(self.assets, row)
