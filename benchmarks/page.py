@@ -41,7 +41,18 @@ _SLIDE = """(stage, n) => {
   slider.dispatchEvent(new Event('input', { bubbles: true }));
 }"""
 _SCRUB = "(stage, n) => stage.store.seek((n * 3) % stage.data.frames)"
-_SCENE = "() => window.MotionStage?.get('tokenize')?.data?.scene"
+_WATCH = """() => {
+  const scene = () => MotionStage.get('tokenize').data.scene, was = scene();
+  window.mtpTook = null;
+  document.addEventListener('mousedown', () => {
+    const pressed = performance.now();
+    const look = () => {
+      if (scene() === was) requestAnimationFrame(look);
+      else window.mtpTook = performance.now() - pressed;
+    };
+    look();
+  }, { capture: true, once: true });
+}"""
 _FOUR = "() => window.MotionStage?.get('compare')?.data?.figures?.length === 4"
 _DRAWN = "() => window.MotionStage?.get('tokenize')?.joints?.('rebuilt') && document.querySelector('#tokenize-example')"
 
@@ -55,16 +66,16 @@ def opened(page: Page, address: str) -> float:
 
 
 def switched(page: Page) -> Iterator[float]:
-    """Seconds from the choice of an example to its figures, a preset at a time."""
+    """Seconds from the press on an example to its figures, a preset at a time."""
     for place in range(1, FIRST_CLIPS + 1):
-        was = page.evaluate(_SCENE)
         page.locator("#tokenize-example input").click()
         choice = page.get_by_role("option").nth(place)
         choice.wait_for()
-        began = time.perf_counter()
+        page.evaluate(_WATCH)
         choice.click()
-        page.wait_for_function(f"(was) => ({_SCENE})() !== was", arg=was, timeout=PATIENCE, polling="raf")
-        yield time.perf_counter() - began
+        page.wait_for_function("() => window.mtpTook !== null", timeout=PATIENCE)
+        yield float(page.evaluate("() => window.mtpTook")) / 1000
+        page.wait_for_timeout(1_000)
 
 
 def frames(page: Page, stage: str, each: str, count: int = 90) -> float:

@@ -7,6 +7,8 @@ import argparse
 import os
 from collections.abc import Sequence
 from functools import lru_cache
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +57,8 @@ def build(engine: EngineSource = _default_engine) -> gr.Blocks:
 def launch(host: str = "127.0.0.1", port: int = 7860, engine: EngineSource = _default_engine) -> None:
     """Serve the page until the process is stopped."""
     gr.set_static_paths([plotly_script()])
-    build(engine).launch(
+    page = build(engine)
+    page.launch(
         server_name=host,
         server_port=port,
         theme=theme(),
@@ -68,7 +71,11 @@ def launch(host: str = "127.0.0.1", port: int = 7860, engine: EngineSource = _de
         share=False,
         quiet=True,
         enable_monitoring=False,
+        prevent_thread_lock=True,
     )
+    if find_spec("matplotlib"):  # gradio imports it at the first event; a visitor need not wait for that
+        import_module("matplotlib")
+    page.block_thread()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
