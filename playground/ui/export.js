@@ -6,6 +6,7 @@
 (() => {
   if (window.mtpExport) return;
   let server = null; // {write, render, stop}
+  let run = 0; // number of the newest wish
   let panel = null;
   let button = null;
 
@@ -135,7 +136,7 @@
     if (!server) return tell('The page is not ready yet; try again in a moment.');
     busy(true);
     tell(call === 'render' ? 'Starting the renderer' : 'Writing');
-    server[call](wished);
+    server[call]({ ...wished, run: ++run });
   }
 
   // A button that is switched off loses the focus; it gets it back.
@@ -175,12 +176,12 @@
       const before = chosen.get(node.ariaLabel);
       if ([...node.options].some(({ value }) => value === before)) node.value = before;
     }
-    if (!panel.classList.contains('is-busy')) tell('');
-    else busy(true);
+    if (panel.classList.contains('is-busy')) busy(true);
   }
 
   function open() {
     fill();
+    if (!panel.classList.contains('is-busy')) tell('');
     panel.hidden = false;
     button.setAttribute('aria-expanded', 'true');
     panel.querySelector('button, select')?.focus();
@@ -195,7 +196,7 @@
 
   function mount(header, opener) {
     button = opener;
-    const stop = make('button', { type: 'button', class: 'mtp-export-stop', onclick: () => server.stop() }, 'Stop');
+    const stop = make('button', { type: 'button', class: 'mtp-export-stop', onclick: () => server.stop(run) }, 'Stop');
     panel = make(
       'div', { class: 'mtp-export', role: 'dialog', 'aria-label': 'Export', hidden: true }, make('div', { class: 'mtp-export-rows' }),
       make('div', { class: 'mtp-export-foot' }, make('progress', { max: 1, hidden: true, 'aria-label': 'Rendering' }), make('span', { role: 'status' }), stop),

@@ -49,7 +49,7 @@ _CHANNEL = """
 const open = () => window.mtpExport
   ? mtpExport.channel({
       write: (wish) => trigger("ask_file", { wish }), render: (wish) => trigger("ask_picture", { wish }),
-      stop: () => trigger("ask_stop", {}),
+      stop: (run) => trigger("ask_stop", { run }),
     })
   : requestAnimationFrame(open);
 open();
@@ -62,6 +62,7 @@ class Control:
     """What a running export and its "Stop" share."""
 
     stop: bool = False
+    stopped: object = None  # number of the run that was stopped last: "Stop" may arrive before its run begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +245,8 @@ class Handlers:
 
     def render(self, control: Control, event: gr.EventData) -> Iterator[dict[str, Any]]:
         """A film or a strip, with progress."""
-        control.stop = False
+        wish = event.wish if isinstance(event.wish, dict) else {}
+        control.stop = control.stopped is not None and control.stopped == wish.get("run")
         folder, finished = self._folder(), False
         try:
             yield {"state": "working", "done": 0, "total": 0}
@@ -257,9 +259,9 @@ class Handlers:
             if not finished:
                 shutil.rmtree(folder, ignore_errors=True)
 
-    def stop(self, control: Control) -> None:
-        """Ask a running rendering to end."""
-        control.stop = True
+    def stop(self, control: Control, event: gr.EventData) -> None:
+        """Ask a rendering to end, whether it runs or still waits for its turn."""
+        control.stop, control.stopped = True, event.run
 
     def _folder(self) -> Path:
         folder = self.cache / secrets.token_hex(16)

@@ -146,3 +146,13 @@ def test_a_visitor_who_leaves_leaves_nothing_behind(services: Services, tmp_path
     assert next(run)["state"] == "working" and len(list(tmp_path.iterdir())) == 1
     run.close()  # type: ignore[attr-defined]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_stop_counts_for_its_own_run_even_before_that_has_begun(services: Services, tmp_path: Path) -> None:
+    do, control = Handlers(services, str(tmp_path)), Control()
+    asked = {run: type("Event", (), {"wish": {**detail("mp4"), "run": run}})() for run in (1, 2)}
+    do.stop(control, type("Event", (), {"run": 1})())  # type: ignore[arg-type]
+    assert list(do.render(control, asked[1]))[-1] == {"state": "error", "message": "Stopped; nothing was saved."}
+    later = do.render(control, asked[2])
+    assert next(later)["state"] == "working" and not control.stop
+    later.close()  # type: ignore[attr-defined]
