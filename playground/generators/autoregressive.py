@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from playground.generators.base import Edit, Step, TokenBatch
+from playground.generators.base import Edit, Step, TokenBatch, null_text
 from playground.generators.causal import CausalGenerator, kept, without_text
 from playground.limits import LIMITS
 from playground.nn.attention import KeyValueCache, prefix_pattern
@@ -49,7 +49,7 @@ class GPTConfig:
 
 GPT_PRESETS: dict[str, GPTConfig] = {
     "full": GPTConfig(),
-    "lite": GPTConfig(width=256, depth=4, heads=4, hidden=1024, dropout=0.0, text_width=384, code_width=192),
+    "lite": GPTConfig(width=160, depth=4, heads=4, hidden=640, dropout=0.0, text_width=384, code_width=128),
 }
 
 
@@ -99,8 +99,7 @@ class GPT(nn.Module):
         """What a motion is drawn after; rows where dropped (bool [B]) and, without text, all rows get the null text."""
         device = self.head.weight.device
         if text is None:
-            empty = torch.zeros(rows, 1, self.config.text_width, device=device)
-            text = TextFeatures(empty, empty[..., 0] == 0, empty[:, 0], [[] for _ in range(rows)])
+            text = null_text(rows, self.config.text_width, 1).to(device)
         live = torch.ones(rows, device=device) if dropped is None else (~dropped).float()
         if self.start is None:
             states = self.text_proj(text.pooled * live[:, None])[:, None]

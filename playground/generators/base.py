@@ -1,5 +1,6 @@
 """The nouns of generation and what every generator can do (architecture: nouns and verbs)."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
@@ -80,6 +81,12 @@ def redraw_masks(keep: Tensor, sizes: Sequence[int], forced: int = 0) -> tuple[T
     return tuple(masks)
 
 
+def null_text(rows: int, width: int, words: int) -> TextFeatures:
+    """A text of zeros for every row, so many words long: what free-form generation reads."""
+    mask = torch.ones(rows, words, dtype=torch.bool)
+    return TextFeatures(torch.zeros(rows, words, width), mask, torch.zeros(rows, width), [[] for _ in range(rows)])
+
+
 class TokenNetwork(Protocol):
     """A module that learns to draw tokens."""
 
@@ -127,6 +134,59 @@ class Generator(Protocol):
     ) -> Tokens:
         """Redraw the tokens where keep (bool [T] over the latents) is False."""
         ...
+
+
+class StepGenerator(ABC):
+    """What follows for a generator of tokens from its steps."""
+
+    likelihood: ClassVar[bool] = False
+
+    @abstractmethod
+    def steps(
+        self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling, edit: Edit | None = None
+    ) -> Iterator[Step]:
+        """Yield after every finished level, or once for all. text None draws free-form."""
+
+    def generate(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Step:
+        """The last step: all levels drawn. text None is free-form; lengths int64 [B] in frames."""
+        *_, last = self.steps(text, lengths, sampling)
+        return last
+
+
+class ScoredGenerator(StepGenerator):
+    """What follows besides where the generator has logits of given tokens."""
+
+    likelihood: ClassVar[bool] = True
+
+    @abstractmethod
+    def logits(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
+        """Logits [B, s_n, V_n] of every level, given what was drawn before, without guidance."""
+
+    def edit(
+        self,
+        tokens: Tokens,
+        keep: Tensor,
+        text: TextFeatures | None,
+        lengths: Tensor,
+        sampling: Sampling,
+        forced: int = 0,
+    ) -> Tokens:
+        """Redraw the tokens where keep (bool [T]) is False; kept positions hold their codes at every level (A10).
+
+        A causal generator goes from left to right: what comes later is not seen. forced: so many coarse levels are
+        taken from the source whole.
+        """
+        redraw = redraw_masks(keep, tokens.sizes, forced)
+        *_, last = self.steps(text, lengths, sampling, Edit(tokens, redraw))
+        return last.tokens
+
+    @torch.no_grad()
+    def score(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
+        """Log-probability [B, s_n] of every given token, one array a level, teacher-forced, without guidance."""
+        return [
+            part.log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
+            for part, ids in zip(self.logits(tokens, text, lengths), tokens.ids, strict=True)
+        ]
 
 
 class LikelihoodGenerator(Generator, Protocol):

@@ -52,7 +52,7 @@ class DiffusionConfig:
 PRESETS: dict[str, DiffusionConfig] = {
     "full": DiffusionConfig(),
     "lite": DiffusionConfig(
-        patch=4, width=256, depth=6, hidden=512, dropout=0.0, text_width=384, visited=10, noise=0.0
+        patch=4, width=160, depth=6, hidden=384, dropout=0.0, text_width=384, visited=10, noise=0.0
     ),
 }  # fmt: skip
 

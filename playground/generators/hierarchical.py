@@ -45,7 +45,7 @@ class HierarchicalConfig:
 HIERARCHICAL_PRESETS: dict[str, HierarchicalConfig] = {
     "full": HierarchicalConfig(),
     "lite": HierarchicalConfig(
-        width=160, depths=(4, 2, 1, 1, 1, 1), heads=(4, 4, 2, 2, 2, 2), hidden=512, dropout=0.0, corrupt=0.2,
+        width=96, depths=(4, 2, 1, 1, 1, 1), heads=(4, 4, 2, 2, 2, 2), hidden=288, dropout=0.0, corrupt=0.2,
         text_width=384, codes=(512,) * 6,
     ),
 }  # fmt: skip

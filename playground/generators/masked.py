@@ -7,24 +7,22 @@ both transformers and the estimator of a motion's length, so that they are train
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from playground.errors import PlaygroundError
-from playground.generators.base import Edit, Step, TokenBatch
+from playground.generators.base import Edit, Step, TokenBatch, null_text
 from playground.generators.masking import (
+    MaskingGenerator,
     Trunk,
     TrunkConfig,
     branch_logits,
     choose,
     corrupt,
     draw_hidden,
-    null_text,
     prediction_loss,
-    redraw_rows,
     small_init,
     text_branches,
 )
@@ -32,7 +30,7 @@ from playground.limits import LIMITS
 from playground.nn.linear import Linear
 from playground.nn.sampling import Sampling, entropy_bits
 from playground.text.encoders import TextFeatures
-from playground.tokenizers.base import Tokenizer, Tokens, level_masks
+from playground.tokenizers.base import Tokens, level_masks
 from playground.tokenizers.quantizers import MultiScaleQuantizer
 
 
@@ -55,7 +53,7 @@ class MaskedConfig(TrunkConfig):
 MASKED_PRESETS: dict[str, MaskedConfig] = {
     "full": MaskedConfig(),
     "lite": MaskedConfig(
-        width=192, depth=4, heads=3, hidden=512, dropout=0.1, text_width=384, code_width=192, small_init=False
+        width=128, depth=4, heads=2, hidden=256, dropout=0.1, text_width=384, code_width=96, small_init=False
     ),
 }
 
@@ -161,17 +159,10 @@ class MaskedResidual(nn.Module):
 
 
 @dataclass(frozen=True, eq=False)
-class MaskedGenerator:
+class MaskedGenerator(MaskingGenerator):
     """The network with the tokenizer whose tokens it draws; holds no state of a call."""
 
     network: MaskedResidual
-    tokenizer: Tokenizer
-    likelihood: ClassVar[bool] = False
-
-    @property
-    def quantizer(self) -> MultiScaleQuantizer:
-        """Of the tokenizer."""
-        return self.tokenizer.quantizer
 
     @torch.no_grad()
     def steps(
@@ -213,18 +204,6 @@ class MaskedGenerator:
             tokens = Tokens(tuple(drawn), c.codes)
             embedding = self.tokenizer.embed(tokens, None, lengths)
             yield Step(level + 1, tokens, embedding, entropy_bits(logits), logits)
-
-    def generate(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Step:
-        """The last step: all levels drawn."""
-        *_, last = self.steps(text, lengths, sampling)
-        return last
-
-    def edit(
-        self, tokens: Tokens, keep: Tensor, text: TextFeatures | None, lengths: Tensor, sampling: Sampling
-    ) -> Tokens:
-        """Redraw the tokens of all levels where keep (bool [T]) is False; kept ones stay as they are (B3)."""
-        *_, last = self.steps(text, lengths, sampling, Edit(tokens, redraw_rows(self.tokenizer, keep, lengths)))
-        return last.tokens
 
     @torch.no_grad()
     def estimate_length(self, text: TextFeatures) -> Tensor:

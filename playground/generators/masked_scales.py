@@ -7,28 +7,27 @@ or by cross-attention.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor, nn
 
-from playground.generators.base import Edit, Step, TokenBatch
+from playground.generators.base import Edit, Step, TokenBatch, null_text
 from playground.generators.masking import (
+    MaskingGenerator,
     Trunk,
     TrunkConfig,
     branch_logits,
     corrupt,
     draw_hidden,
-    null_text,
     prediction_loss,
-    redraw_rows,
     small_init,
     text_branches,
 )
 from playground.nn.attention import Memory
 from playground.nn.sampling import Sampling, entropy_bits
 from playground.text.encoders import TextFeatures
-from playground.tokenizers.base import Tokenizer, Tokens, level_masks
+from playground.tokenizers.base import Tokens, level_masks
 from playground.tokenizers.quantizers import MultiScaleQuantizer
 
 
@@ -48,7 +47,7 @@ class MaskedScalesConfig(TrunkConfig):
 MASKED_SCALES_PRESETS: dict[str, MaskedScalesConfig] = {
     "full": MaskedScalesConfig(),
     "lite": MaskedScalesConfig(
-        width=192, depth=5, heads=3, hidden=512, dropout=0.1, text_width=384, code_width=192, small_init=False
+        width=128, depth=5, heads=2, hidden=384, dropout=0.1, text_width=384, code_width=128, small_init=False
     ),
 }
 
@@ -93,17 +92,10 @@ class MaskedScales(nn.Module):
 
 
 @dataclass(frozen=True, eq=False)
-class MaskedScalesGenerator:
+class MaskedScalesGenerator(MaskingGenerator):
     """The network with the tokenizer whose tokens it draws; holds no state of a call."""
 
     network: MaskedScales
-    tokenizer: Tokenizer
-    likelihood: ClassVar[bool] = False
-
-    @property
-    def quantizer(self) -> MultiScaleQuantizer:
-        """Of the tokenizer."""
-        return self.tokenizer.quantizer
 
     @torch.no_grad()
     def steps(
@@ -135,15 +127,3 @@ class MaskedScalesGenerator:
         tokens = Tokens(tuple(ids.split(sizes, dim=1)), c.codes)
         embedding = self.tokenizer.embed(tokens, None, lengths)
         yield Step(len(sizes), tokens, embedding, entropy_bits(logits), logits)
-
-    def generate(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Step:
-        """The only step: all scales drawn."""
-        (step,) = self.steps(text, lengths, sampling)
-        return step
-
-    def edit(
-        self, tokens: Tokens, keep: Tensor, text: TextFeatures | None, lengths: Tensor, sampling: Sampling
-    ) -> Tokens:
-        """Redraw the tokens of all scales where keep (bool [T], resized to each scale) is False; kept ones stay."""
-        (step,) = self.steps(text, lengths, sampling, Edit(tokens, redraw_rows(self.tokenizer, keep, lengths)))
-        return step.tokens

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from playground.generators.base import redraw_masks
+from playground.generators.base import Edit, StepGenerator, redraw_masks
 from playground.nn.attention import Memory
 from playground.nn.blocks import Block
 from playground.nn.linear import Linear
@@ -22,7 +22,8 @@ from playground.nn.sampling import Sampling, confidence, guide, gumbel_draw, top
 from playground.nn.sequences import join_masks
 from playground.nn.transfer import on_device
 from playground.text.encoders import TextFeatures
-from playground.tokenizers.base import Tokenizer, level_masks
+from playground.tokenizers.base import Tokenizer, Tokens, level_masks
+from playground.tokenizers.quantizers import MultiScaleQuantizer
 
 RANDOM_SHARE = 0.1  # of the hidden tokens: a random code stands there
 MASK_SHARE = 0.88  # of the other hidden tokens: the mask token; the rest stays as it is
@@ -220,7 +221,21 @@ def redraw_rows(tokenizer: Tokenizer, keep: Tensor, lengths: Tensor) -> tuple[Te
     return masks
 
 
-def null_text(rows: int, width: int, words: int) -> TextFeatures:
-    """A text of zeros for every row, so many words long: what free-form generation reads."""
-    mask = torch.ones(rows, words, dtype=torch.bool)
-    return TextFeatures(torch.zeros(rows, words, width), mask, torch.zeros(rows, width), [[] for _ in range(rows)])
+@dataclass(frozen=True, eq=False)
+class MaskingGenerator(StepGenerator):
+    """A masked network with the tokenizer whose tokens it draws; holds no state of a call."""
+
+    network: nn.Module
+    tokenizer: Tokenizer
+
+    @property
+    def quantizer(self) -> MultiScaleQuantizer:
+        """Of the tokenizer."""
+        return self.tokenizer.quantizer
+
+    def edit(
+        self, tokens: Tokens, keep: Tensor, text: TextFeatures | None, lengths: Tensor, sampling: Sampling
+    ) -> Tokens:
+        """Redraw the tokens of all levels where keep (bool [T], resized to each) is False; kept ones stay (B3)."""
+        *_, last = self.steps(text, lengths, sampling, Edit(tokens, redraw_rows(self.tokenizer, keep, lengths)))
+        return last.tokens

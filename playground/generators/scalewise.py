@@ -6,13 +6,12 @@ next scale's length, is the input of that scale. The loop over scales is written
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from playground.generators.base import Edit, Step, TokenBatch, redraw_masks
+from playground.generators.base import Edit, ScoredGenerator, Step, TokenBatch
 from playground.limits import LIMITS
 from playground.nn.attention import CrossAttention, KeyValueCache, SelfAttention
 from playground.nn.blocks import SwiGLU
@@ -190,10 +189,9 @@ class ScalewiseTransformer(nn.Module):
 
 
 @dataclass(frozen=True, eq=False)
-class ScalewiseGenerator:
+class ScalewiseGenerator(ScoredGenerator):
     """The network with the quantizer whose tokens it draws; holds no state of a call."""
 
-    likelihood: ClassVar[bool] = True
     transformer: ScalewiseTransformer
     quantizer: MultiScaleQuantizer = field(repr=False)
 
@@ -226,37 +224,6 @@ class ScalewiseGenerator:
             drawn.append(ids)
             total = total + quantizer.share(level, ids)
             yield Step(level + 1, Tokens(tuple(drawn), quantizer.codes), total, entropy_bits(logits), logits)
-
-    def generate(self, text: TextFeatures | None, lengths: Tensor, sampling: Sampling) -> Step:
-        """The last step: all scales drawn."""
-        *_, last = self.steps(text, lengths, sampling)
-        return last
-
-    def edit(
-        self,
-        tokens: Tokens,
-        keep: Tensor,
-        text: TextFeatures | None,
-        lengths: Tensor,
-        sampling: Sampling,
-        forced: int = 0,
-    ) -> Tokens:
-        """Redraw the tokens where keep (bool [T]) is False; kept positions hold their codes at every scale (A10).
-
-        forced: so many coarse scales are taken from the source whole.
-        """
-        redraw = redraw_masks(keep, self.quantizer.scales, forced)
-        *_, last = self.steps(text, lengths, sampling, Edit(tokens, redraw))
-        return last.tokens
-
-    @torch.no_grad()
-    def score(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:
-        """Log-probability [B, s_n] of every given token, one array a level, teacher-forced, without guidance."""
-        logits = self.logits(tokens, text, lengths)
-        return [
-            part.log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
-            for part, ids in zip(logits, tokens.ids, strict=True)
-        ]
 
     @torch.no_grad()
     def logits(self, tokens: Tokens, text: TextFeatures | None, lengths: Tensor) -> list[Tensor]:

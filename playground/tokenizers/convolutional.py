@@ -71,7 +71,7 @@ class ConvConfig:
 
 def _lite(config: ConvConfig, **changes: object) -> ConvConfig:
     """A system at a size that one CPU core trains."""
-    return replace(config, **({"width": 192, "code_width": 192, "dropout": 0.0, "attention_dropout": 0.0} | changes))  # type: ignore[arg-type]
+    return replace(config, **({"width": 128, "code_width": 128, "dropout": 0.0, "attention_dropout": 0.0} | changes))  # type: ignore[arg-type]
 
 
 _MOMASK = ConvConfig()
@@ -94,8 +94,8 @@ CONV_PRESETS: dict[str, ConvConfig] = {
     "t2mgpt-lite": _lite(_T2MGPT),
     "momask-lite": _lite(_MOMASK),
     "momaskpp-lite": _lite(_MOMASKPP, codes=(256,) * 4),  # batches of 32 motions bring `enough` vectors for 256 codes
-    "mosa-lite": _lite(_MOSA, width=112, code_width=160, codes=linear_codes(128, 384, 10), phi="residual"),
-    "mogo-lite": _lite(_MOGO, codes=(512,) * 6, code_width=128),
+    "mosa-lite": _lite(_MOSA, width=80, code_width=112, codes=linear_codes(128, 384, 10), phi="residual"),
+    "mogo-lite": _lite(_MOGO, codes=(512,) * 6, code_width=96),
 }
 
 

@@ -23,17 +23,17 @@ SIZES = ("cpu", "gpu")
 
 # 4.0 M numbers, 8 MB: six tokenizers and five generators of this size fit into a repository.
 _CPU_TOKENIZER = TokenizerTraining(
-    model=replace(PRESETS["lite"], scales=FULL_SCALES, width=128, heads=2, hidden=384, code_width=128),
+    model=replace(PRESETS["lite"], scales=FULL_SCALES, width=96, heads=2, hidden=320, code_width=96),
     batch=BatchConfig(size=32, speed=0.3, source_balance=0.5, action_balance=0.3),
-    schedule=Schedule(steps=3_600, rate=1.2e-3),
+    schedule=Schedule(steps=2_400, rate=1.2e-3),
     heading=0.02,
     masked_mean=True,
 )
 _CPU_GENERATOR = GeneratorTraining(  # 3.7 M
-    model=replace(GENERATOR_PRESETS["lite"], width=192, heads=3, hidden=384),
+    model=replace(GENERATOR_PRESETS["lite"], width=128, depth=5, heads=2, hidden=256),
     tokenizer="lgtok-tokenizer",
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=4_000, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=3_000, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
     keep=0.8,
 )
 # 13.2 M and 6.4 M: 39 MB together, close to the largest that a flagship may have.

@@ -20,7 +20,7 @@ from playground.training.configs import FeatureTraining, GeneratorTraining, Sche
 _TOKENIZER = TokenizerTraining(
     model=CONV_PRESETS["momask-lite"],
     batch=BatchConfig(size=32, speed=0.3, source_balance=0.5, action_balance=0.3),
-    schedule=Schedule(steps=1_500, rate=1e-3, warmup=100),
+    schedule=Schedule(steps=2_400, rate=1e-3, warmup=100),
     language_drop=0.0,  # they read no text
     heading=0.02,
     masked_mean=True,
@@ -30,12 +30,12 @@ _GENERATOR = GeneratorTraining(
     model=MASKED_PRESETS["lite"],
     tokenizer="momask-tokenizer",
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=4_000, rate=6e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=3_000, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
 )
 _DIFFUSION = FeatureTraining(
     model=DIFFUSION_PRESETS["lite"],
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=4_000, rate=5e-4, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=2_500, rate=1e-3, clip=1.0, fall=0.35),
 )
 
 TOKENIZERS: dict[str, TokenizerTraining] = {
@@ -48,7 +48,7 @@ TOKENIZERS: dict[str, TokenizerTraining] = {
 _SCALES, _GPT = MASKED_SCALES_PRESETS["lite"], GPT_PRESETS["lite"]
 GENERATORS: dict[str, GeneratorTraining] = {
     "mosa-generator": replace(
-        _GENERATOR, model=replace(GENERATOR_PRESETS["lite"], width=192, heads=3, hidden=384), keep=0.8,
+        _GENERATOR, model=replace(GENERATOR_PRESETS["lite"], width=128, depth=5, heads=2, hidden=256), keep=0.8,
         tokenizer="mosa-tokenizer",
     ),
     "momask-generator": _GENERATOR,
@@ -66,7 +66,7 @@ GENERATORS: dict[str, GeneratorTraining] = {
 DIFFUSIONS: dict[str, FeatureTraining] = {
     "mdm-generator": _DIFFUSION,
     "mdm-casim-generator": replace(_DIFFUSION, model=replace(_DIFFUSION.model, casim="encoder")),
-    "mdm-casim-decoder-generator": replace(_DIFFUSION, model=replace(_DIFFUSION.model, casim="decoder")),
+    "mdm-casim-decoder-generator": replace(_DIFFUSION, model=replace(_DIFFUSION.model, casim="decoder", depth=4)),
 }
 
 Rows = dict[str, TokenizerTraining | GeneratorTraining | FeatureTraining]

@@ -108,12 +108,10 @@ def find_training(name: str, size: str = "cpu") -> Training:
 def run_training(training: Training, order: Order) -> dict[str, Any]:
     """Run a training; returns its facts."""
     with_steps(training.schedule, order.steps)
-    if isinstance(training, TokenizerTraining):
-        return _train_tokenizer(training, order)
+    if isinstance(training, TokenizerTraining | FeatureTraining):
+        return _train_on_motions(training, order)
     if isinstance(training, GeneratorTraining):
         return _train_generator(training, order)
-    if isinstance(training, FeatureTraining):
-        return _train_features(training, order)
     if isinstance(training, RefitTraining):
         return _train_refit(training, order)
     if isinstance(training, RefinerTraining):
@@ -147,7 +145,8 @@ def training_batches(
     return BatchSource(samples, normaliser, config.batch, config.seed, device)
 
 
-def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
+def _train_on_motions(config: TokenizerTraining | FeatureTraining, order: Order) -> dict[str, Any]:
+    """A tokenizer, or a generator of features: what learns from the clips themselves."""
     library, out = Library.open(order.library), order.out / part_of(config)
     fabric = start_fabric(order.launch, out)
     encoder = load_encoder(config.text)
@@ -159,7 +158,12 @@ def _train_tokenizer(config: TokenizerTraining, order: Order) -> dict[str, Any]:
     with torch.random.fork_rng():
         torch.manual_seed(config.seed)
         model = build(fitted(config.model, text_width=encoder.width))
-    task = TokenizerTask(model, config, batches, validation, store, encoder, library.name, fabric.device)
+    rest = (batches, validation, store, encoder, library.name, fabric.device)
+    task: Task
+    if isinstance(config, TokenizerTraining):
+        task = TokenizerTask(model, config, *rest)
+    else:
+        task = FeatureTask(model, config, *rest)
     return order.fit(fabric, task, config, out)
 
 
@@ -201,22 +205,6 @@ def tokenizer_of(config: GeneratorTraining, out: Path, assets: Path = ASSETS) ->
             return path
     where = f"into {out.parent / lender}" if config.lent else "into the same folder"
     raise PlaygroundError(f"{places[0]} is absent; train {config.tokenizer} {where} first")
-
-
-def _train_features(config: FeatureTraining, order: Order) -> dict[str, Any]:
-    library, out = Library.open(order.library), order.out / part_of(config)
-    fabric = start_fabric(order.launch, out)
-    encoder = load_encoder(config.text)
-    batches = training_batches(library, config, library.normaliser, fabric.device)
-    held_out = library_samples(library, "val")
-    texts = [*batches.captions(), *(caption for sample in held_out for caption in sample.captions), ""]
-    store = FeatureStore.cached(order.library, texts, encoder)
-    validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
-    with torch.random.fork_rng():
-        torch.manual_seed(config.seed)
-        network = build(fitted(config.model, text_width=encoder.width))
-    task = FeatureTask(network, config, batches, validation, store, encoder, library.name, fabric.device)
-    return order.fit(fabric, task, config, out)
 
 
 def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
