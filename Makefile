@@ -23,9 +23,10 @@ RUNS ?= runs
 DATA ?= $(PLAYGROUND_DATA)
 SIZE ?= cpu
 MINUTES ?=
+THREADS ?= 2
 QUEUE = --library $(LIBRARY) --size $(SIZE) $(if $(MINUTES),--minutes $(MINUTES))
 
-.PHONY: help setup app test notebooks figures train family others ablations ablations-others bench benchpage lint format screenshots clean
+.PHONY: help setup app test notebooks figures train family others ablations ablations-others bench benchpage benchendless lint format screenshots clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 24
@@ -77,6 +78,9 @@ ablations-others: $(DEV) $(LIBRARY)/library.json ## the same for the other paper
 
 bench: $(RUNTIME) ## measure speed and memory
 	$(BIN)/python -m playground bench
+
+benchendless: $(RUNTIME) ## measure five minutes of endless motion: speed, memory, seams (THREADS=n)
+	$(BIN)/python -m benchmarks.endless $(THREADS)
 
 benchpage: $(DEV) $(SYSTEM) ## measure how quick the page is to a visitor, in a headless browser
 	$(BIN)/python -m benchmarks.page

@@ -28,6 +28,8 @@ GOALS = {  # seconds, shipped checkpoint, 2 cores
     "scale scrubber": 0.4,
     "page ready": 3.0,
 }
+ENDLESS = ("2", "1")  # threads
+FLAT = 8_000_000  # bytes that an endless motion may gain after its first half minute
 FULL = ("tokenize", "detokenize", "generate", "text-to-motion")
 SETTINGS = (("batch 1", 1, 2), ("batch 32", 32, 2), ("batch 1, 1 thread", 1, 1))  # label, batch, threads
 TRAINING = ("train-tokenizer", "train-generator")
@@ -40,17 +42,25 @@ class Row:
 
     section: str
     what: str
-    unit: str  # s | MB
+    unit: str  # s | MB | x (times real time) | m/s³
     value: float
     goal: float | None = None
     reference: float | None = None  # cited, another machine
     note: str = ""
+    least: bool = False  # is the goal the least that is wanted, not the most?
+
+    @property
+    def good(self) -> bool | None:
+        """Whether the goal is reached; None without one."""
+        if self.goal is None:
+            return None
+        return self.value >= self.goal if self.least else self.value <= self.goal
 
     def line(self) -> str:
         """For the table on the screen."""
         parts = [f"{self.what:<42}{_number(self.value):>9} {self.unit:<3}"]
         if self.goal is not None:
-            parts.append(f"goal {_number(self.goal):>7} {'ok  ' if self.value <= self.goal else 'over'}")
+            parts.append(f"goal {_number(self.goal):>7} {'ok  ' if self.good else 'under' if self.least else 'over'}")
         if self.reference is not None:
             parts.append(f"reference {_number(self.reference):>7}, ratio {self.value / self.reference:.2f}")
         return "  ".join([*parts, self.note]).rstrip()
@@ -85,6 +95,7 @@ def run(out: Path | None = None) -> None:
 
 def _rows(reference: dict[str, Any]) -> Iterator[Row]:
     yield from _shipped()
+    yield from _endless()
     yield from _full_size(reference)
     yield from _training(reference)
 
@@ -100,6 +111,32 @@ def _shipped() -> Iterator[Row]:
     else:
         _say("no checkpoint is shipped here; train one with the train command")
     yield Row(section, "page ready", "s", page_ready(), GOALS["page ready"], note="process start to answer of the page")
+
+
+def _endless() -> Iterator[Row]:
+    """Five minutes of motion, a second at a time."""
+    for threads in ENDLESS:
+        answer = fresh("benchmarks.endless", threads)
+        if answer["note"]:
+            _say(f"\n{answer['note']}")
+        yield from endless_rows(answer)
+
+
+def endless_rows(answer: dict[str, Any]) -> Iterator[Row]:
+    """What benchmarks/endless.py measured, figure by figure."""
+    section = f"endless, {answer['seconds']} s of motion, threads: {answer['threads']}"
+    speed, memory, jerk = answer["speed"], answer["bytes"], answer["jerk"]
+    worst = f"second {speed['worst_at'] + 1}"
+    yield Row(section, "motion per computing, mean", "x", speed["mean"], 1.0, least=True)
+    yield Row(section, "   the worst single second", "x", speed["worst"], 1.0, note=worst, least=True)
+    yield Row(section, "until the first second is there", "s", answer["first"])
+    yield Row(section, "memory, settled", "MB", memory["settled"] / 1e6)
+    yield Row(section, "   the largest after that", "MB", memory["most"] / 1e6, (memory["settled"] + FLAT) / 1e6)
+    yield Row(section, "   at the end", "MB", memory["end"] / 1e6, (memory["settled"] + FLAT) / 1e6)
+    yield Row(section, "   of it the past of the motion", "MB", answer["held"]["most"] / 1e6)
+    for what, key in (("jerk at switches", "at_switches"), ("jerk elsewhere", "elsewhere")):
+        if jerk[key] is not None:
+            yield Row(section, what, "m/s³", jerk[key], note=f"{answer['switches']} switches")
 
 
 def _full_size(reference: dict[str, Any]) -> Iterator[Row]:

@@ -156,6 +156,20 @@ class Attention:
 
 
 @dataclass(frozen=True, eq=False)
+class Alignment:
+    """How much each frame of a generated motion looked at each word piece while the motion was drawn."""
+
+    system: str
+    checkpoint: str
+    what: str  # which attention it is, in words
+    words: list[str]  # [W] word pieces, the encoder's marks for begin and end included
+    weights: Floats  # [F, W] mean over steps and heads, rows sum to 1
+    by_step: Floats = field(repr=False)  # [S, F, W] one map a step of denoising, noisiest first; S = 1 without steps
+    patch: int = 1  # frames that share one row, as they share one token or one query
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Alternatives:
     """What else a generated token could have been, given all coarser scales."""
 

@@ -5,6 +5,7 @@ Everything takes the loaded system and arrays of one motion, and keeps nothing.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -130,6 +131,50 @@ def text_attention(
     words = text.words[0]
     repeated = weights.repeat_interleave(runtime.tokenizer.config.patch, dim=2)[:, :, :frames, : len(words)]
     return list(words), repeated.numpy()
+
+
+@dataclass(frozen=True, eq=False)
+class WordMaps:
+    """A generator's attention to the words of a prompt. weights: [S, F, W], a map a step of denoising, else one."""
+
+    words: list[str]
+    weights: Floats
+    patch: int  # frames that share a row
+
+
+def generator_attention(
+    runtime: Runtime,
+    prompt: str,
+    frames: int,
+    levels: Sequence[LevelTokens],
+    seed: int,
+    how: SamplingDefaults,
+    check: Check = None,
+) -> WordMaps | None:
+    """Where the last layer of the generator looks in a prompt while it draws one motion; None where it cannot say.
+
+    A diffusion is run once more with its seed; tokens are given to the network as they were drawn.
+    """
+    source: Any = runtime.generator if runtime.diffusion is None else runtime.diffusion
+    reads = getattr(source, "alignment", None)
+    if reads is None:
+        return None
+    text, lengths, sampling = _asked(runtime, prompt, frames, (seed,), how, check)
+    assert text is not None
+    try:
+        if runtime.diffusion is not None:
+            weights, patch = reads(text, lengths, sampling), int(source.network.config.patch)
+        else:
+            tokens = Tokens(tuple(torch.from_numpy(o.ids.copy())[None] for o in levels), tuple(o.codes for o in levels))
+            drawn = reads(tokens, text, lengths)  # (1, T, W)
+            weights = drawn[:, torch.arange(frames) * drawn.shape[1] // frames]
+            patch = -(-frames // drawn.shape[1])
+    except PlaygroundError:  # the time is up
+        raise
+    except ValueError:  # a variant that sees the pooled text alone, or words in front of the motion
+        return None
+    words = list(text.words[0])
+    return WordMaps(words, weights[:, :, : len(words)].float().numpy(), patch)
 
 
 # ---- draws ---------------------------------------------------------------------------------------------------------

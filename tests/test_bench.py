@@ -10,12 +10,20 @@ from benchmarks.timing import ROOT
 from playground import bench
 from playground.errors import PlaygroundError
 
+ENDLESS = {
+    "note": "", "seconds": 300, "first": 0.5, "speed": {"mean": 9.0, "worst": 2.0, "worst_at": 20}, "switches": 14,
+    "bytes": {"settled": 4e8, "most": 4.1e8, "end": 4.05e8}, "held": {"settled": 5e5, "most": 6e5, "end": 5e5},
+    "jerk": {"at_switches": 30.0, "elsewhere": 20.0},
+}  # fmt: skip
+
 
 def test_a_row_says_goal_and_ratio_to_the_reference() -> None:
     line = bench.Row("s", "tokenize, batch 1", "s", 0.021, goal=0.035, reference=0.07).line()
     assert "0.021 s" in line and "goal   0.035 ok" in line and "ratio 0.30" in line
     assert "over" in bench.Row("s", "generate", "s", 1.5, goal=1.0).line()
     assert "goal" not in bench.Row("s", "peak memory", "MB", 812.4).line()
+    assert "ok" in bench.Row("s", "speed", "x", 1.5, goal=1.0, least=True).line()
+    assert "under" in bench.Row("s", "speed", "x", 0.5, goal=1.0, least=True).line()
 
 
 def test_every_goal_and_cited_figure_has_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -26,6 +34,8 @@ def test_every_goal_and_cited_figure_has_a_row(monkeypatch: pytest.MonkeyPatch, 
         if arguments == ("shipped",):
             seconds = {"load": 1.0, "tokenize and reconstruct": 0.1, "generate": 0.4, "scale scrubber": 0.02}
             return {"seconds": seconds, "peak": 5e8}
+        if module == "benchmarks.endless":
+            return ENDLESS | {"threads": int(arguments[0])}
         return {"best": 0.01, "median": 0.02, "turns": 3, "loaded": 4e8, "peak": 6e8}
 
     monkeypatch.setattr(bench, "fresh", fake)
@@ -41,6 +51,10 @@ def test_every_goal_and_cited_figure_has_a_row(monkeypatch: pytest.MonkeyPatch, 
         for label, seconds in settings.items():
             row = names.get(f"{case}, {label}", names.get(case))
             assert row is not None and row["reference"] == seconds and row["goal"] == seconds / 2
+    for threads in bench.ENDLESS:
+        endless = {row["what"].strip(): row for row in report["rows"] if row["section"].endswith(f"threads: {threads}")}
+        assert endless["the worst single second"]["note"] == "second 21" and endless["at the end"]["goal"] == 408
+        assert endless["the largest after that"]["value"] == 410 and endless["jerk at switches"]["value"] == 30
     assert ("generate", "32", "2") in calls and ("tokenize", "1", "1") in calls
     assert report["machine"]["cores"] >= 1 and report["reference"] == reference
 

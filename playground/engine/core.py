@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from playground.engine import codes, language, microscope, placement, refining, regeneration, scales
+from playground.engine import alignment, codes, language, microscope, placement, refining, regeneration, scales
 from playground.engine.base import BaseEngine
 from playground.engine.checks import (
     UNIT,
@@ -24,6 +24,7 @@ from playground.engine.endless import EndlessSession
 from playground.engine.generation import finish
 from playground.errors import PlaygroundError
 from playground.findings import (
+    Alignment,
     Alternatives,
     Attention,
     Edited,
@@ -122,6 +123,15 @@ class Engine(BaseEngine):
         """Cross-attention of the detokenizer: words by frames. caption None: the one that the tokens go with."""
         text = normalise(result.caption if caption is None else caption, what="caption", allow_empty=True)
         return language.words_by_frames(self._with_tokens(result), result, text)
+
+    def looks_at_words(self, system: str) -> bool:
+        """Whether `alignment` has something to tell of a system's motions; loads no weight."""
+        return alignment.can_look(self.assets, row_of(system))
+
+    def alignment(self, made: Generation, deadline: float | None = DEADLINE) -> Alignment:
+        """Which words each frame looked at while a motion was drawn, [F, W]: the generator's attention (CASIM), else
+        the detokenizer's. PlaygroundError for a motion without a prompt or a system that looks at no single words."""
+        return alignment.words_by_time(self.runtime(made.system), made, deadline_check(deadline))
 
     # ---- alternatives and regeneration ----------------------------------------------------------------------------
 

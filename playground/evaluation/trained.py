@@ -79,8 +79,8 @@ def measure_generated(
 ) -> dict[str, Any]:
     """A generator file with its tokenizer on the captions of clips: motions as long as the recorded ones.
 
-    {"checkpoint", "parameters" of the generator, "n", "gfid", "gtop1", "gmm_dist" over repeats}. PlaygroundError if a
-    file is not what it should be or no clip is long enough.
+    {"checkpoint", "tokenizer" (its checkpoint), "parameters" of the generator, "n", "gfid", "gtop1", "gmm_dist" over
+    repeats}. PlaygroundError if a file is not what it should be or no clip is long enough.
     """
     from playground.architectures import caller
     from playground.checkpoints import load_generator
@@ -91,7 +91,7 @@ def measure_generated(
     clips = measurable(library, indices)
     passes = _passes(runtime, library, evaluator, sampling)
     repeated = _repeated(passes, clips, evaluator, repeats, seed, lambda items: passes.generated(items).embeddings)
-    about = {"checkpoint": card.hash[:12], "parameters": _size(network), "n": len(clips)}
+    about = {"checkpoint": card.hash[:12], "tokenizer": bare.checkpoint, "parameters": _size(network), "n": len(clips)}
     return about | {f"g{key}": value for key, value in repeated.items()}
 
 

@@ -33,7 +33,7 @@ def sweep_plot(results: Results, *, title: str = "Guidance sweep", height: int =
             _curve(figure, column, result, key, SYSTEMS[system].title)
         real = next((result.value(result.more["real"].get(key)) for result in found.values()), Estimate(None))
         if real.mean is not None:
-            annotation = {"text": "real motion", "font": {"size": 11}}
+            annotation = {"text": "real motion", "font": {"size": 11}, "yanchor": "top" if key == TOP else "bottom"}
             figure.add_hline(y=real.mean, line=reference_line(), annotation=annotation, row=1, col=column)
         figure.update_yaxes(title=words, row=1, col=column)
     if not found:

@@ -8,43 +8,41 @@ first weights, the loss as a mean over real frames; on a CPU also smaller widths
 switches motion (or latents) and text of a side together. No clip here is longer than a window, so Table 7 compares
 short clips alone with all of them.
 
-The queue can be killed at any point. After every run it is measured, and the results are written whole; rows that are
-not trained say so.
+The queue can be killed at any point, and go on elsewhere (record.py). After every run it is measured, and the results
+are written whole; rows that are not trained say so.
 """
 
-import argparse
-import json
-import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from playground.data.batches import BatchConfig
 from playground.data.library import Library
-from playground.engine import ASSETS
-from playground.evaluation.evaluators import Evaluator, evaluator_path, load_evaluator
+from playground.evaluation.evaluators import Evaluator
 from playground.evaluation.reconstruction import LONG, measure_contrastive, measure_tokenizer
 from playground.text.words import WORDS
 from playground.tokenizers.transformer import FULL_SCALES, TokenizerConfig, linear_codes
 from playground.training.configs import EVALUATORS, EvaluatorTraining, Schedule, TokenizerTraining
-from playground.training.queue import Job, add_arguments, chosen, guarded, limits_of, run_queue, say, status
+from playground.training.queue import Job
+from playground.training.record import (
+    CLIPS,
+    SEED,
+    SPLIT,
+    Record,
+    Row,
+    Table,
+    ablation_job,
+    judge,
+    options_of,
+    run_table,
+)
+from playground.training.run import Training
 
-STEPS = 3_000
-CLIPS = 1_000  # the first so many ids of the training list (5,000 in the paper)
-SPLIT, SEED, REPEATS = "test", 0, 5
-NOT_TRAINED = "not trained yet"
+STEPS = 3_000  # on the first CLIPS ids of the training list (5,000 in the paper)
+REPEATS = 5
 BATCHES = (8, 16, 32, 64, 128)  # of the contrastive evaluator (Table 6)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row of one table. A training that stands in several tables has one name and is run once."""
-
-    table: str  # of the paper
-    label: str  # the row, as a notebook prints it
-    name: str  # of the run
 
 
 BASE = "base"
@@ -136,100 +134,41 @@ def contrastive(batch: int) -> EvaluatorTraining:
 
 def ablation_jobs(out: Path, size: str) -> list[Job]:
     """Every training of the table, the base first, the contrastive ones last."""
-    trainings: dict[str, TokenizerTraining | EvaluatorTraining] = dict(ablations(size))
+    trainings: dict[str, Training] = dict(ablations(size))
     trainings |= {f"contrastive-{batch}": contrastive(batch) for batch in BATCHES}
-    return [
-        Job(name, training, out / size / name, {"run": f"ablation {name}", "size": size})
-        for name, training in trainings.items()
-    ]
+    return [ablation_job(name, trainings, out / size, {"size": size}) for name in trainings]
 
 
 # ---- results --------------------------------------------------------------------------------------------------------
 
 
-def measured(job: Job, library: Library, evaluator: Evaluator | None) -> dict[str, Any] | None:
-    """What a finished job measures; None for another one. Kept beside its checkpoint until either file changes."""
-    if not job.done:
-        return None
-    kept = job.out / "measured.json"
-    judge = evaluator.hash[:12] if evaluator else None
-    settings = {"data": library.name, "split": SPLIT, "seed": SEED, "repeats": REPEATS, "evaluator": judge}
-    settings["changed"] = job.checkpoint.stat().st_mtime_ns
-    if kept.is_file():
-        found: dict[str, Any] = json.loads(kept.read_text())
-        if found["settings"] == settings:
-            return dict(found["figures"])
-    if isinstance(job.training, EvaluatorTraining):
-        figures = measure_contrastive(job.checkpoint, library, SPLIT, seed=SEED)
-    else:
-        figures = measure_tokenizer(
-            job.checkpoint, job.name, library, SPLIT, evaluator=evaluator, repeats=REPEATS, seed=SEED
-        )
-    write_json(kept, {"settings": settings, "figures": figures})
-    return figures
-
-
-def results(jobs: Sequence[Job], library: Library, size: str, evaluator: Evaluator | None) -> dict[str, Any]:
-    """The stored result: every row of every table with its figures, or with the status "not trained yet"."""
-    by_name = {job.name: job for job in jobs}
-    figures = {job.name: measured(job, library, evaluator) for job in jobs}
-    rows = []
-    for row in ROWS:
-        found = figures.get(row.name)
-        facts = by_name[row.name].facts() if found else {}
-        trained = {"status": "trained", "step": facts.get("step"), "seconds": round(facts.get("seconds", 0.0))}
-        head = {"table": row.table, "label": row.label, "run": row.name}
-        rows.append(head | (trained | found if found else {"status": NOT_TRAINED}))
+def table_of(out: Path, size: str) -> Table:
+    """The table, with its runs under `out`."""
     start = base(size)
-    provenance = {
-        "system": "tiny tokenizers of the ablations", "data": library.name, "split": SPLIT, "seed": SEED, "size": size,
-        "steps": STEPS, "batch": start.batch.size, "training_clips": CLIPS, "training_seed": start.seed,
-        "evaluator": evaluator.hash[:12] if evaluator else None,
+    about = {
+        "system": "tiny tokenizers of the ablations", "split": SPLIT, "seed": SEED, "size": size, "steps": STEPS,
+        "batch": start.batch.size, "training_clips": CLIPS, "training_seed": start.seed, "repeats": REPEATS,
     }  # fmt: skip
-    return {"item": "ablations", "made_by": "make ablations", "provenance": provenance, "rows": rows}
+    return Table("ablations", "make ablations", ROWS, tuple(ablation_jobs(out, size)), about, measure)
+
+
+def measure(job: Job, library: Library, evaluator: Evaluator | None) -> dict[str, Any]:
+    """The figures of a finished training."""
+    if isinstance(job.training, EvaluatorTraining):
+        return measure_contrastive(job.checkpoint, library, SPLIT, seed=SEED)
+    return measure_tokenizer(job.checkpoint, job.name, library, SPLIT, evaluator=evaluator, repeats=REPEATS, seed=SEED)
 
 
 def measure_again(library: Path, size: str = "cpu", out: Path = Path("runs/ablations")) -> dict[str, Any]:
-    """What `results` gives for the trainings that are finished under `out`; nothing is trained, nothing is stored."""
-    evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
-    return results(ablation_jobs(out, size), Library.open(library), size, evaluator)
-
-
-def write_json(path: Path, value: dict[str, Any]) -> None:
-    """Whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    partial.write_text(json.dumps(value, indent=1) + "\n")
-    os.replace(partial, path)
+    """The result of the trainings that are finished under `out` alone; nothing is trained, nothing is stored."""
+    return Record(table_of(out, size), Library.open(library), judge()).results()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command; returns its exit status."""
     about = "Train and measure the ablations, one after another; call it again to go on."
-    parser = argparse.ArgumentParser(prog="python -m playground.training.ablations", description=about)
-    add_arguments(parser, "runs/ablations")
-    stored = ASSETS / "results" / "ablations.json"
-    parser.add_argument("--results", type=Path, default=stored, metavar="FILE", help="where the figures are written")
-    options = parser.parse_args(arguments)
-
-    def run() -> None:
-        jobs = ablation_jobs(options.out, options.size)
-        wanted = chosen(jobs, options.only)
-        if options.list:
-            say("\n".join(status(wanted)))
-            return
-        limits, library = limits_of(options), Library.open(options.library)
-        evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
-
-        def after(job: Job) -> None:
-            if os.environ.get("RANK", "0") == "0":
-                write_json(options.results, results(jobs, library, options.size, evaluator))
-
-        done = run_queue(wanted, limits, say, after)
-        after(wanted[0])
-        say(f"{options.results}: {'all rows that were asked for' if done else 'the rows trained so far'}")
-
-    return guarded(run)
+    options = options_of("ablations", about, "runs/ablations", arguments)
+    return run_table(options, table_of(options.out, options.size))
 
 
 if __name__ == "__main__":

@@ -4,45 +4,45 @@ MOGO's Tables 1, 3 and 4 and its levels, SnapMoGen's figure on layers, its Table
 with the same seed, steps, batches and clips as its base; what differs is what its name says. The held-out rows are
 trained on the library without one source, normaliser included, and measured on all clips of that source.
 
-The queue can be killed at any point. After every run it is measured, and the results are written whole; rows that are
-not trained say so.
+The queue can be killed at any point, and go on elsewhere (record.py). After every run it is measured, and the results
+are written whole; rows that are not trained say so.
 """
 
-import argparse
-import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from playground.data.library import SPLITS, Library, LibraryClip, write_library
-from playground.engine import ASSETS
-from playground.evaluation.evaluators import Evaluator, evaluator_path, load_evaluator
+from playground.evaluation.evaluators import Evaluator
 from playground.evaluation.trained import measure_generated, measure_rebuilt
 from playground.systems import SYSTEMS
-from playground.training.ablations import CLIPS, NOT_TRAINED, write_json
 from playground.training.configs import GeneratorTraining, TokenizerTraining
 from playground.training.others import OTHERS
-from playground.training.queue import Job, add_arguments, chosen, guarded, limits_of, run_queue, say, status
-from playground.training.run import tokenizer_of
+from playground.training.queue import Job, Limits
+from playground.training.record import (
+    CLIPS,
+    SEED,
+    SPLIT,
+    After,
+    Record,
+    Row,
+    Table,
+    ablation_job,
+    in_order,
+    judge,
+    options_of,
+    run_table,
+)
+from playground.training.run import Training, tokenizer_of
 
 STEPS, DRAWN_STEPS = 1_200, 1_500  # of a tokenizer, of a generator
 WIDTH = 96  # of the convolutions
-SPLIT, SEED, REPEATS = "test", 0, 3
+REPEATS = 3
 HELD_OUT = "HDM05"  # the source that the held-out rows have not seen
 SIZES = ("small", "middle", "large")  # of Fig 5: width, feed-forward, layers, heads
 _SHAPES = {"small": (96, 256, 3, 3), "middle": (192, 512, 5, 3), "large": (320, 1024, 8, 5)}
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row of one table. A training that stands in several tables has one name and is run once."""
-
-    table: str
-    label: str  # as the cited table has it, where there is one
-    name: str  # of the run
-    split: str = SPLIT  # what it is measured on: a split, or a source that is held out
 
 
 MOGO, SNAP = "mogo-base", "snap-base"
@@ -132,11 +132,10 @@ def _snap() -> dict[str, TokenizerTraining | GeneratorTraining]:
     found["snap-full"] = scaled((1,) * len(divisors))
     found["snap-no-attention"] = _tokenizer("momaskpp", attention="none")
     found["snap-same"] = _tokenizer("momask")
-    found["snap-in-context"] = _generator("momaskpp", SNAP)
+    shapes = {size: dict(zip(("width", "hidden", "depth", "heads"), _SHAPES[size], strict=True)) for size in SIZES}
+    found["snap-in-context"] = _generator("momaskpp", SNAP, **shapes["middle"])
     for size in SIZES:
-        width, hidden, depth, heads = _SHAPES[size]
-        shape = {"width": width, "hidden": hidden, "depth": depth, "heads": heads}
-        found[f"snap-cross-{size}"] = _generator("momaskpp-cross", SNAP, **shape)
+        found[f"snap-cross-{size}"] = _generator("momaskpp-cross", SNAP, **shapes[size])
     return found
 
 
@@ -152,7 +151,8 @@ def held_out(name: str) -> bool:
 
 def ablation_jobs(out: Path) -> list[Job]:
     """Every training of the table. A held-out system's tokenizer and generator lie side by side, as all do."""
-    return [Job(name, training, out / name, {"run": f"ablation {name}"}) for name, training in trainings().items()]
+    known: dict[str, Training] = dict(trainings())
+    return [ablation_job(name, known, out) for name in known]
 
 
 def library_without(library: Library, source: str, folder: Path) -> Path:
@@ -171,90 +171,57 @@ def library_without(library: Library, source: str, folder: Path) -> Path:
 # ---- results --------------------------------------------------------------------------------------------------------
 
 
-def measured(job: Job, library: Library, evaluator: Evaluator | None) -> dict[str, Any] | None:
-    """What a finished job measures; None for another one. Kept beside its checkpoint until either file changes."""
-    if not job.done:
-        return None
+def table_of(out: Path) -> Table:
+    """The table, with its runs under `out`."""
+    about = {
+        "system": "small ablations of the other systems", "split": SPLIT, "seed": SEED, "steps": STEPS,
+        "drawn_steps": DRAWN_STEPS, "training_clips": CLIPS, "repeats": REPEATS, "held_out": HELD_OUT,
+        "training_seed": 0,
+    }  # fmt: skip
+    return Table("ablations_others", "make ablations-others", ROWS, tuple(ablation_jobs(out)), about, measure, how)
+
+
+def how(job: Job) -> dict[str, Any]:
+    """How a generator's tokens are drawn."""
+    drawn = isinstance(job.training, GeneratorTraining)
+    return {"sampling": asdict(SYSTEMS[system_of(job.name)].sampling)} if drawn else {}
+
+
+def measure(job: Job, library: Library, evaluator: Evaluator | None) -> dict[str, Any]:
+    """The figures of a finished training."""
     source = HELD_OUT if held_out(job.name) else None
-    kept = job.out / f"measured-{job.checkpoint.parent.name}.json"
-    settings: dict[str, Any] = {"data": library.name, "split": SPLIT, "source": source, "seed": SEED}
-    settings |= {"repeats": REPEATS, "evaluator": evaluator.hash[:12] if evaluator else None}
-    settings["changed"] = job.checkpoint.stat().st_mtime_ns
-    if kept.is_file():
-        found: dict[str, Any] = json.loads(kept.read_text())
-        if found["settings"] == settings:
-            return dict(found["figures"])
     splits = SPLITS if source else (SPLIT,)
     clips = [index for split in splits for index in library.split(split)]
     clips = [index for index in clips if source in (None, library.clips[index].source)]
-    if isinstance(job.training, GeneratorTraining):
-        tokenizer, sampling = tokenizer_of(job.training, job.out), SYSTEMS[system_of(job.name)].sampling
-        figures = measure_generated(
-            tokenizer, job.checkpoint, job.name, library, clips, evaluator, sampling, repeats=REPEATS, seed=SEED
-        )
-        figures["validation"] = job.facts().get("validation", [])
-    else:
-        figures = measure_rebuilt(job.checkpoint, job.name, library, clips, evaluator, repeats=REPEATS, seed=SEED)
-    write_json(kept, {"settings": settings, "figures": figures})
-    return figures
-
-
-def results(jobs: Sequence[Job], library: Library, evaluator: Evaluator | None) -> dict[str, Any]:
-    """The stored result: every row of every table with its figures, or with the status "not trained yet"."""
-    by_name = {job.name: job for job in jobs}
-    figures = {job.name: measured(job, library, evaluator) for job in jobs}
-    rows = []
-    for row in ROWS:
-        found = figures.get(row.name)
-        facts = by_name[row.name].facts() if found else {}
-        trained = {"status": "trained", "step": facts.get("step"), "seconds": round(facts.get("seconds", 0.0))}
-        head = {"table": row.table, "label": row.label, "run": row.name, "measured_on": row.split}
-        rows.append(head | (trained | found if found else {"status": NOT_TRAINED}))
-    provenance = {
-        "system": "small ablations of the other systems", "data": library.name, "split": SPLIT, "seed": SEED,
-        "steps": STEPS, "drawn_steps": DRAWN_STEPS, "training_clips": CLIPS, "repeats": REPEATS, "held_out": HELD_OUT,
-        "training_seed": 0, "evaluator": evaluator.hash[:12] if evaluator else None,
-    }  # fmt: skip
-    return {"item": "ablations_others", "made_by": "make ablations-others", "provenance": provenance, "rows": rows}
+    if not isinstance(job.training, GeneratorTraining):
+        return measure_rebuilt(job.checkpoint, job.name, library, clips, evaluator, repeats=REPEATS, seed=SEED)
+    tokenizer, sampling = tokenizer_of(job.training, job.out), SYSTEMS[system_of(job.name)].sampling
+    figures = measure_generated(
+        tokenizer, job.checkpoint, job.name, library, clips, evaluator, sampling, repeats=REPEATS, seed=SEED
+    )
+    return figures | {"validation": job.facts().get("validation", [])}
 
 
 def measure_again(library: str | Path, out: Path = Path("runs/ablations-others")) -> dict[str, Any]:
-    """What `results` gives for the trainings that are finished under `out`; nothing is trained, nothing is stored."""
-    evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
-    return results(ablation_jobs(out), Library.open(Path(library)), evaluator)
+    """The result of the trainings that are finished under `out` alone; nothing is trained, nothing is stored."""
+    return Record(table_of(out), Library.open(Path(library)), judge()).results()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command; returns its exit status."""
     about = "Train and measure the other systems' ablations, one after another; call it again to go on."
-    parser = argparse.ArgumentParser(prog="python -m playground.training.ablations_others", description=about)
-    add_arguments(parser, "runs/ablations-others", sizes=())
-    stored = ASSETS / "results" / "ablations_others.json"
-    parser.add_argument("--results", type=Path, default=stored, metavar="FILE", help="where the figures are written")
-    options = parser.parse_args(arguments)
+    options = options_of("ablations_others", about, "runs/ablations-others", arguments, sizes=())
 
-    def run() -> None:
-        jobs = ablation_jobs(options.out)
-        wanted = chosen(jobs, options.only)
-        if options.list:
-            say("\n".join(status(wanted)))
-            return
-        limits, library = limits_of(options), Library.open(options.library)
-        evaluator = load_evaluator("tmr") if evaluator_path("tmr").is_file() else None
-
-        def after(job: Job) -> None:
-            write_json(options.results, results(jobs, library, evaluator))
-
-        after(wanted[0])
-        seen = [job for job in wanted if not held_out(job.name)]
-        unseen = [job for job in wanted if held_out(job.name)]
-        done = run_queue(seen, limits, say, after)
+    def train(jobs: Sequence[Job], limits: Limits, after: After) -> bool:
+        unseen = [job for job in jobs if held_out(job.name)]
+        done = in_order([job for job in jobs if not held_out(job.name)], limits, after)
         if unseen and not limits.passed:
-            folder = library_without(library, HELD_OUT, options.out / f"library-without-{HELD_OUT}")
-            done = run_queue(unseen, replace(limits, library=folder), say, after) and done
-        say(f"{options.results}: {'all rows that were asked for' if done else 'the rows trained so far'}")
+            folder = options.out / f"library-without-{HELD_OUT}"
+            library_without(Library.open(limits.library), HELD_OUT, folder)
+            done = in_order(unseen, replace(limits, library=folder), after) and done
+        return done
 
-    return guarded(run)
+    return run_table(options, table_of(options.out), train)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,9 +61,15 @@ class Job:
         return all((self.out / part / "checkpoint.safetensors").is_file() for part in parts)
 
     @property
+    def own(self) -> bool:
+        """Whether the run in its folder, if there is one, is of the config that `about` tells."""
+        facts = self.facts()
+        return not facts or facts.get("config") == self.about.get("config")
+
+    @property
     def done(self) -> bool:
-        """Whether its checkpoint is there and has all the steps."""
-        return self.checkpoint.is_file() and self.facts().get("step", 0) >= self.steps
+        """Whether its checkpoint is there, has all the steps and is its own."""
+        return self.checkpoint.is_file() and self.facts().get("step", 0) >= self.steps and self.own
 
 
 @dataclass(frozen=True)
@@ -137,7 +143,7 @@ def left(jobs: Sequence[Job]) -> str:
     """How much is left to train, in words: steps, and time where a finished or begun job says how long a step takes."""
     steps, seconds, rates = 0, 0.0, _rates(jobs)
     for job in jobs:
-        missing = 0 if job.done else job.steps - job.facts().get("step", 0)
+        missing = 0 if job.done else job.steps - (job.facts().get("step", 0) if job.own else 0)
         steps += missing
         rate = rates.get(part_of(job.training))
         seconds = float("nan") if missing and rate is None else seconds + missing * (rate or 0.0)
@@ -214,14 +220,15 @@ def chosen(jobs: Sequence[Job], only: Sequence[str]) -> list[Job]:
     return [job for job in jobs if not only or job.name in only]
 
 
-def status(jobs: Sequence[Job]) -> list[str]:
-    """A line a job: done, how far, or not begun."""
+def status(jobs: Sequence[Job], stored: Collection[str] = ()) -> list[str]:
+    """A line a job: done, stored (measured, without a run here), how far, or not begun. stored: names of jobs."""
     lines = []
     for job in jobs:
-        facts = job.facts()
-        state = "done" if job.done else f"step {facts['step']} of {job.steps}" if facts else "not begun"
-        lines.append(f"{job.name:<28} {state}")
-    return [*lines, left(jobs)]
+        step = job.facts().get("step", 0)
+        state = f"step {step} of {job.steps}" if step else "not begun"
+        state = "done" if job.done else "stored" if job.name in stored else state
+        lines.append(f"{job.name:<28} {state if job.own else f'{state}, its folder holds a run of another config'}")
+    return [*lines, left([job for job in jobs if job.done or job.name not in stored])]
 
 
 def say(text: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from playground.errors import PlaygroundError
-from playground.ui.comparing import VARIATIONS
+from playground.ui.comparing import VARIATIONS, first_variation
 from playground.ui.complete import complete
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State
@@ -66,18 +66,14 @@ def _endless(services: Services, state: State) -> Values:
 
 def _codebooks(services: Services, state: State) -> Values:
     """The systems side by side, on a motion; with one system alone what its scales add."""
-    return {"vary": _systems_or_scales(services)}
+    return {"vary": first_variation(services)}
 
 
 def _embedding_map(services: Services, state: State) -> Values:
     """The clip that is ringed, or what was placed, as the systems or the scales rebuild it."""
     placed = str(state["place"] or "")
     own = placed if placed and not placed.startswith(OWN_FILE) else state["motion"]
-    return {"vary": _systems_or_scales(services), "motion": own}
-
-
-def _systems_or_scales(services: Services) -> str:
-    return "system" if len(VARIATIONS["system"].choices(services)) > 1 else "scales"
+    return {"vary": first_variation(services), "motion": own}
 
 
 def _listed(services: Services, vary: str, values: Sequence[str]) -> str | None:

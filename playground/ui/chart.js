@@ -3,7 +3,8 @@
  * Plotly itself is served by the playground and loaded once, after the page stands. A trace may carry
  * meta.dark = {"marker.color": ...} with what changes in the dark; every other colour comes from the --mtp tokens.
  * A hover over a point that has customdata is told by 'mtp-hover' {id, x, y}, its end by one with id null.
- * A click on such a point triggers 'pick' and rings that point in every panel of the chart; the figure's
+ * A click on such a point triggers 'pick' and rings that point in every panel of the chart, but for traces whose
+ * meta.ring is false; the figure's
  * layout.meta.picked names the point that is ringed at first; an event 'mtp-pick' {chart: element id, id} rings another.
  * An event 'mtp-lasso' {chart, group} lets a drag draw a group of that name ('' ends it): its points are outlined, and
  * 'lasso' is triggered with {group, ids}; with {chart, forget: true} the groups are gone.
@@ -69,7 +70,7 @@
 
   // Rings round the point `id`, one in each panel that has it.
   function rings(data, id) {
-    return data.flatMap((trace) => {
+    return data.filter(({ meta }) => meta?.ring !== false).flatMap((trace) => {
       const at = Array.isArray(trace.customdata) ? trace.customdata.findIndex((entry) => first(entry) === id) : -1;
       if (at < 0) return [];
       return [{ type: 'scatter', mode: 'markers', x: [trace.x[at]], y: [trace.y[at]], xaxis: trace.xaxis, yaxis: trace.yaxis,

@@ -22,6 +22,13 @@ _SLIDES = """
 for name, result in results.items():
     print(f"{name}: feet slide {foot_sliding(result.motion.joints):.0f} mm/s")
 """
+_LOOKED = """
+# Which words each moment looked at while the motion was drawn: weights [frames, words], every row sums to 1.
+looked = engine.alignment(made)
+print(looked.what)
+for word, share in zip(looked.words, looked.weights.T):
+    print(f"{word}: most at {share.argmax() / made.motion.fps:.2f} s, {share.max():.0%} of the attention there")
+"""
 _MADE = "Made by the Motion Token Playground; run it with the Python that the playground is installed in."
 
 
@@ -77,6 +84,7 @@ def _generate(state: State) -> tuple[str, str]:
         + ("made = engine.refine(made)  # standing feet slide less; the tokens stay\n" if state["plant"] else "")
         + TOKENS.format(name="made")
         + 'write_motion(made.motion, Path("generated.bvh"))\n'
+        + (_LOOKED if state["words"] and not state["free"] else "")
     )
 
 

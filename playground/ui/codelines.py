@@ -69,12 +69,18 @@ def opened(state: State) -> str:
             f"(example,) = [one for one in engine.examples() if one.id == {literal(wanted)}]\n"
             f"motion = example.motion().slice(0, {poses})\n"
         )
-    first = round(start * LIMITS.fps)
+    first, part = round(start * LIMITS.fps), int(state["part"]) if state.room == "tokenize" else 0
+    window, more = f"motion = motion.slice({first}, {first + poses})\n", ""
+    if part:
+        more = "from playground.data.segment import segment\n"
+        window = (
+            f"cuts = segment(motion.joints, motion.fps, longest={poses / LIMITS.fps})  # at still moments\n"
+            f"motion = motion.slice(*cuts.spans[{part - 1}])  # part {part}\n"
+        )
     return (
-        "from pathlib import Path\n\nfrom playground.engine import default_engine\n"
+        f"from pathlib import Path\n\n{more}from playground.engine import default_engine\n"
         "from playground.motion.formats import read_motion\n\nengine = default_engine()\n"
-        f"motion = read_motion(Path({literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n"
-        f"motion = motion.slice({first}, {first + poses})\n"
+        f"motion = read_motion(Path({literal(wanted.removeprefix(OWN_FILE))})).motion  # your own file\n{window}"
     )
 
 

@@ -1,15 +1,13 @@
 """What the room Compare does: one prompt, motion or edit through two to six settings or systems, how they differ.
 
 A row of VARIATIONS is one thing that may differ; systems are a row like the others and appear as soon as a second one
-is shipped. `settings_of` gives the settings of a wish, `run` their results one after the other. The motion may be one
-of the library, a stored clip of the maps or a generated one: `origin_of` finds it by its name in an address.
+is shipped. `settings_of` gives the settings of a wish, `run` their results one after the other.
 """
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from playground.analysis.bundle import Bundle
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.measures import foot_sliding, mpjpe
@@ -17,10 +15,9 @@ from playground.motion.motion import Motion
 from playground.systems import row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens
-from playground.ui.drawing import MADE, made_again
 from playground.ui.facts import bits
 from playground.ui.services import Services
-from playground.ui.state import State
+from playground.ui.state import State, control
 from playground.ui.uploads import checked_number
 
 PROMPT, MOTION, EDIT = "prompt", "motion", "edit"
@@ -29,6 +26,9 @@ EDIT_TITLES = {  # kind of edit -> its name
     "inpaint": "In-painting", "outpaint": "Out-painting", "prefix": "Prefix", "suffix": "Suffix",
     "inbetween": "In-between",
 }  # fmt: skip
+ALONE = "scales"  # what differs where there is one system only
+SHOWN = ("lgtok-lite", "momask", "mogo")  # systems side by side at first: three, so that the screen stays calm
+DRAWN = ("lgtok-lite", "momask", "t2mgpt-casim")  # from a prompt
 Choices = Callable[[Services], Sequence[tuple[str, str]]]
 
 
@@ -47,14 +47,6 @@ class Setting:
     scales: int | None = None  # None: all
     kind: str = ""  # of an edit
     span: tuple[float, float] | None = None  # of an edit, in seconds; None is that of the published benchmark
-
-
-@dataclass(frozen=True)
-class Origin:
-    """The motion that goes through, and what it is called. Its caption is the motion's own."""
-
-    motion: Motion
-    title: str
 
 
 @dataclass(frozen=True)
@@ -101,7 +93,7 @@ def _kinds(services: Services) -> list[tuple[str, str]]:
 
 _WORDS = {"own": "Its caption", "none": "No caption", "wrong": f"“{WRONG}”"}
 VARIATIONS: dict[str, Variation] = {
-    "system": Variation("Systems", MOTION, _systems(False), (), lambda s, v: replace(s, system=v)),
+    "system": Variation("Systems", MOTION, _systems(False), SHOWN, lambda s, v: replace(s, system=v)),
     "scales": Variation(
         "Scales kept", MOTION, _scales, ("2", "5", "10"), lambda s, v: replace(s, scales=int(v)),
         "Scales 1 to {}"),
@@ -112,7 +104,7 @@ VARIATIONS: dict[str, Variation] = {
         "Guidance g, decoder", MOTION, _listed("0", "0.5", "1", "2", "3", "4", "6"), ("0", "2", "4"),
         lambda s, v: replace(s, guidance=float(v)),
         "g = {}"),
-    "maker": Variation("Systems", PROMPT, _systems(True), (), lambda s, v: _with_its_sampling(s, v)),
+    "maker": Variation("Systems", PROMPT, _systems(True), DRAWN, lambda s, v: _with_its_sampling(s, v)),
     "seed": Variation(
         "Seed", PROMPT, _listed(*map(str, range(10))), ("0", "1", "2", "3"),
         lambda s, v: replace(s, seed=int(v)),
@@ -140,14 +132,25 @@ def offered(services: Services) -> list[tuple[str, str]]:
 
 
 def chosen(services: Services, vary: str, wanted: Sequence[str]) -> list[tuple[str, str]]:
-    """The choices that are wanted, in their order on the screen; the usual ones (or the first) where these are none."""
+    """The choices that are wanted, in their order on the screen; the usual ones where these are less than two, or the
+    first."""
     variation = VARIATIONS[vary]
     choices = list(variation.choices(services))
-    for names in (wanted, variation.usual, [name for _, name in choices]):
+    for names in (wanted, variation.usual):
         found = [choice for choice in choices if choice[1] in names]
-        if found:
+        if len(found) > 1:
             return found
-    return choices
+    return choices[: variation.most]
+
+
+def variation_of(services: Services, wanted: object) -> str:
+    """The variation that is wanted, or where it has nothing to choose from here, the number of scales."""
+    return str(wanted) if wanted in [key for _, key in offered(services)] else ALONE
+
+
+def first_variation(services: Services) -> str:
+    """What differs when the room is opened: systems, where there are several."""
+    return variation_of(services, control("compare", "vary").default)
 
 
 def settings_of(
@@ -249,45 +252,3 @@ def span_of(state: State) -> tuple[float, float] | None:
     """The span of an edit that an address holds, in seconds, or None."""
     start, stop = state.values.get("from"), state.values.get("to")
     return None if start is None or stop is None or stop <= start else (float(start), float(stop))
-
-
-def is_origin(services: Services, name: str) -> bool:
-    """Whether `origin_of` finds a motion by this name."""
-    return name.startswith(MADE) or name in {one.id for one in services.examples()} or is_clip(services, name)
-
-
-def is_clip(services: Services, name: str) -> bool:
-    """Whether it names a stored clip of the maps."""
-    return _clip(services, name) is not None
-
-
-def origin_caption(services: Services, name: str) -> str:
-    """The words of its own that a motion has; "" for a generated one, whose prompt is not in its name."""
-    bundle, row = _clip(services, name) or (None, 0)
-    if bundle is not None:
-        return bundle.clips[row].caption
-    return "" if name.startswith(MADE) else services.example(name).caption
-
-
-def origin_of(services: Services, name: str, caption: str | None = None) -> Origin:
-    """The motion that a name of an address stands for. caption: other words for it, the prompt of a generated one.
-    PlaygroundError where there is none."""
-    own = origin_caption(services, name) if caption is None else caption
-    if name.startswith(MADE):
-        made = made_again(services, name, own)
-        return Origin(replace(made.motion, caption=made.prompt), made.prompt or "a generated motion")
-    bundle, row = _clip(services, name) or (None, 0)
-    if bundle is None:
-        found = services.example(name)
-        return Origin(replace(found.motion(), caption=own), found.title)
-    motion = services.engine().decode(bundle.token_file(row)).motion
-    return Origin(replace(motion, caption=own), bundle.clips[row].caption or bundle.clips[row].action)
-
-
-def _clip(services: Services, name: str) -> tuple[Bundle, int] | None:
-    """A stored clip of the maps: where it lies, None where there is none of that name."""
-    try:
-        bundle = services.bundle(services.default_system().name)
-    except PlaygroundError:
-        return None
-    return (bundle, bundle.position(name)) if name in bundle.ids else None

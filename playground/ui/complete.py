@@ -4,9 +4,17 @@ from collections.abc import Callable
 from typing import Any
 
 from playground.systems import row_of
-from playground.ui.comparing import MOTION, VARIATIONS, chosen, is_clip, is_origin, origin_caption, settings_of, span_of
+from playground.ui.comparing import (
+    MOTION,
+    VARIATIONS,
+    chosen,
+    settings_of,
+    span_of,
+    variation_of,
+)
 from playground.ui.drawing import MADE
 from playground.ui.editing import opening_motion
+from playground.ui.origins import is_clip, is_origin, origin_caption
 from playground.ui.rooms.embedding import first_clip
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State, controls_of
@@ -24,7 +32,8 @@ def complete(services: Services, state: State) -> State:
 
 def _with_settings(services: Services, state: State) -> State:
     """What is compared, one by one, as `settings`: the address names only what differs."""
-    vary = str(state["vary"])
+    vary = variation_of(services, state["vary"])
+    state = state.with_values(vary=vary)
     picked = [name for _, name in chosen(services, vary, str(state.values.get("values") or "").split("_"))]
     text = str(state["caption"] if VARIATIONS[vary].of == MOTION else state["prompt"])
     picked, numbers = picked[: VARIATIONS[vary].most], (state["seconds"], state["seed"])

@@ -8,9 +8,9 @@ from scale 6 on with seed 17).
 import re
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
@@ -21,8 +21,12 @@ from playground.ui.services import Services
 from playground.ui.state import State
 from playground.ui.uploads import checked_number
 
+if TYPE_CHECKING:
+    from playground.findings import Alignment
+
 WISHES = (  # keys of CONTROLS
     "prompt", "free", "seconds", "seed", "g", "s", "temperature", "topk", "topp", "takes", "plant",
+    "system",
 )  # fmt: skip
 MADE = "made_"  # how the value of `motion` begins that stands for a generated motion
 MAX_NAME = 80  # characters of that value
@@ -44,6 +48,7 @@ class Wish:
     top_p: float
     takes: int = 1  # motions side by side, with seeds seed, seed + 1, ...
     plant: bool = False  # does the root refiner compute the way over the ground?
+    system: str = ""  # "" for the one the page prefers
 
     @classmethod
     def checked(cls, prompt: object, free: object, *numbers: object) -> "Wish":
@@ -59,10 +64,12 @@ class Wish:
             ("top-p", 0.05, 1),
             ("the number of motions side by side", 1, LIMITS.max_seeds),
         )
-        given = (*numbers, 1)[: len(bounds)]
-        plant = numbers[len(bounds) :] == (True,)
+        given, (plant, system) = (*numbers, 1)[: len(bounds)], (*numbers[len(bounds) :], False, "")[:2]
         sure = [checked_number(n, *bound) for n, bound in zip(given, bounds, strict=True)]
-        return cls(words, sure[0], int(sure[1]), sure[2], sure[3], sure[4], sure[5], sure[6], int(sure[7]), plant)
+        return cls(
+            words, sure[0], int(sure[1]), sure[2], sure[3], sure[4], sure[5], sure[6], int(sure[7]), plant is True,
+            str(system or ""),
+        )  # fmt: skip
 
     @property
     def seeds(self) -> tuple[int, ...]:
@@ -142,7 +149,7 @@ class Result:
         """Key of the table of controls -> value, as the room shows this result."""
         wish = self.wish
         own = (wish.prompt or "", wish.prompt is None, wish.seconds, wish.seed, wish.guidance, wish.cfg,
-               wish.temperature, wish.top_k, wish.top_p, wish.takes, wish.plant)  # fmt: skip
+               wish.temperature, wish.top_k, wish.top_p, wish.takes, wish.plant, self.takes[0].system)  # fmt: skip
         return dict(zip(WISHES, own, strict=True))
 
 
@@ -158,6 +165,8 @@ class Visit:
     wanted: tuple[Change, ...] = ()  # of a link, to be made after its wish
     picked: str = ""  # the code that was clicked in the card of a token, "" for none
     token: tuple[int, int] | None = None  # (scale, position) that the card is about
+    words: bool = False  # whether the score shows which words each moment looked at
+    looked: "tuple[Generation, Alignment] | None" = None  # what was looked at last
 
     def keep(self, result: Result) -> None:
         """Put a result on the screen and into the history, the oldest making room."""
@@ -187,7 +196,7 @@ class Drawing:
 def draw(services: Services, wish: Wish) -> Iterator[Drawing]:
     """A wish, scale by scale."""
     began = time.perf_counter()
-    engine, system = services.engine(), services.default_system()
+    engine, system = services.engine(), services.system(wish.system)
     steps = engine.generate_many_steps(
         wish.prompt, wish.seconds, system.name, wish.seeds, guidance=wish.guidance, cfg=wish.cfg,
         temperature=wish.temperature, top_k=wish.top_k, top_p=wish.top_p,
@@ -223,11 +232,13 @@ def change(services: Services, result: Result, take: int, wanted: Change) -> Ite
 
 
 def wish_values(services: Services, state: State) -> tuple[Any, ...]:
-    """What the address of the room Generate asks for, in the order of `Wish.checked`."""
-    own = services.sampling()
-    usual = {"g": own.guidance, "s": own.cfg, "temperature": own.temperature, "topk": own.top_k, "topp": own.top_p}
+    """What the address of the room Generate asks for, in the order of `Wish.checked`; the system that the page prefers
+    where the one asked for cannot generate here."""
+    able = {system.name for system in services.shipped("generator")}
+    system = state.system if state.system in able else services.system().name
+    usual = dict(zip(("g", "s", "temperature", "topk", "topp"), astuple(services.sampling(system)), strict=True))
     values = {key: state.values.get(key, usual.get(key, state[key])) for key in WISHES}
-    return tuple((values | {"plant": values["plant"] and services.refines()}).values())
+    return tuple((values | {"plant": values["plant"] and services.refines(), "system": system}).values())
 
 
 def made_name(wish: Wish, seed: int, changes: Sequence[Change] = ()) -> str:
@@ -271,7 +282,7 @@ def last_of(drawings: Iterator[Drawing]) -> Result:
 
 
 def _finish(services: Services, wish: Wish, seconds: float, step: GenerationStep, seed: int) -> Generation:
-    system = services.default_system().name
+    system = services.system(wish.system).name
     made = Generation(
         system, services.checkpoint(system), wish.prompt or "", seed, step.levels, step.entropy, step.motion,
         step.features, seconds, wish.sampling,

@@ -2,6 +2,7 @@
 
 import html
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,19 +11,50 @@ from playground.figures import stage as scene
 from playground.results import Generation, GenerationStep
 from playground.ui.cards import term
 from playground.ui.drawing import Drawing, Result, Visit, Wish, made_name
-from playground.ui.facts import Fact, significant
-from playground.ui.scenes import score, token_facts
+from playground.ui.facts import Fact, as_sentence, significant
+from playground.ui.scenes import score, token_facts, words_strip
 from playground.ui.services import Services
 from playground.ui.shelf import Entry, shelf
 from playground.ui.state import State, query
 from playground.ui.view import View
 
 if TYPE_CHECKING:
-    from playground.findings import Alternatives
+    from playground.findings import Alignment, Alternatives
 
 CHANGED = "another code than before"
+NO_TOKENS = "This system makes a motion from noise and words, step by step. It writes no tokens, so there is no score."
+LOOKED = {  # how the engine's word for an attention begins -> the map's name, and what it shows
+    "detokenizer": ("the detokenizer looks at", "where the detokenizer looks while it turns tokens into frames"),
+    "last layer of the denoiser": (
+        "the denoiser looks at", "where the denoiser looks while it makes the motion from noise"),
+    "last layer of the generator": (
+        "the generator looks at", "where the generator looks when it chooses each token"),
+}  # fmt: skip
 BEFORE = "before"
 Made = GenerationStep | Generation
+
+
+def words_card(looked: "Alignment | None", why: str = "") -> str:
+    """What the map under the score shows, and of which attention; or why there is none. "" for neither."""
+    if looked is None:
+        return f'<p class="mtp-aside">{html.escape(as_sentence(why))}</p>' if why else ""
+    steps = f", on average over {len(looked.by_step)} steps" if len(looked.by_step) > 1 else ""
+    return (
+        f'<p class="mtp-aside">The map under the score shows {_kind(looked)[1]}{steps}. A column is a moment, the line '
+        "is the playhead. Marks such as (begin) take what no word needs.</p>"
+    )
+
+
+def with_words(view: View, looked: "Alignment | None") -> View:
+    """The same result with the map of words by frames under its score, where there is one."""
+    if looked is None:
+        return view
+    strip = words_strip(f"Which words {_kind(looked)[0]}", looked.words, looked.weights)
+    return replace(view, stage={**view.stage, "strips": [strip]})
+
+
+def _kind(looked: "Alignment") -> tuple[str, str]:
+    return next(told for start, told in LOOKED.items() if looked.what.startswith(start))
 
 
 def drawing_view(services: Services, drawing: Drawing, take: int = 0) -> View:
@@ -39,13 +71,15 @@ def result_view(services: Services, result: Result, take: int = 0) -> View:
 def _view(
     services: Services, made: Sequence[Made], wish: Wish, before: Generation | None, take: int, seconds: float
 ) -> View:
-    system, take = services.default_system(), min(take, len(made) - 1)
+    system, take = services.system(wish.system), min(take, len(made) - 1)
     shown, names = made[take], [f"Seed {seed}" for seed in wish.seeds]
     if len(made) == 1:
         names = ["After" if before else "Generated"]
     sizes = services.sizes(system.name, shown.motion.frames)
-    level, several = len(shown.levels), len(made) > 1
-    growing = f"scale {level} of {len(sizes)}" if level < len(sizes) else ""
+    level, count, unit, several = len(shown.levels), len(sizes), "scale" if sizes else "step", len(made) > 1
+    if isinstance(shown, GenerationStep) and not sizes:
+        level, count = shown.level, shown.of
+    growing = f"{unit} {level} of {count}" if level < count else ""
     figures = [scene.figure(BEFORE, "Before", before.motion.joints, system.name)] if before else []
     ghost = BEFORE if before else None
     for n, (one, name) in enumerate(zip(made, names, strict=True)):
@@ -64,8 +98,8 @@ def _view(
         track["name"] = f"{track['name']}, {names[take][:1].lower()}{names[take][1:]}"
     return View(
         stage=scene.payload(figures, tracks, scene=f"{wish.prompt}, {wish.seconds}"),
-        facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)),
-        controls={"prompt": wish.prompt or "", "level": level, "count": len(sizes)},
+        facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)) if sizes else (Fact("0", "tokens", NO_TOKENS),),
+        controls={"prompt": wish.prompt or "", "level": level, "count": count, "unit": unit},
         seconds=seconds,
     )
 
@@ -86,12 +120,13 @@ def earlier(visit: Visit) -> str:
     return shelf("This visit", entries[::-1])
 
 
-def onward(result: Result, take: int) -> str:
-    """Where this motion can be taken next: links that the page follows without leaving."""
+def onward(result: Result, take: int, usual: str = "") -> str:
+    """Where this motion can be taken next: links that the page follows without leaving. usual: the system that Edit
+    works with, "" for that of the motion."""
     wish, made = result.wish, result.takes[take]
     seed = wish.seed if result.changes else made.seed
     links, name = [], made_name(wish, seed, result.changes)
-    if name:
+    if name and usual in ("", made.system):
         links.append(("Edit this motion", State("edit", {"motion": name, "caption": wish.prompt or ""})))
     parts = [f'<a data-state href="{html.escape(query(state), quote=True)}">{text}</a>' for text, state in links]
     return f'<p class="mtp-aside mtp-onward">{" · ".join(parts)}</p>'

@@ -34,18 +34,22 @@ def commits(room: str, controls: Mapping[str, Any], *events: Callable[..., Any],
     """Write these controls of a room into the address whenever one of the events happens, in the browser alone.
 
     controls: key of the table -> component; events: such as `button.click`; forget: keys that the address loses then,
-    because what they said went with what is replaced. A number whose default is the system's own is left out while it
-    is what the component opened with. KeyError for a key the table has not.
+    because what they said went with what is replaced. A system, and a number whose default is the system's own, are
+    left out while they are what the component opened with; with another system all its numbers are written. KeyError
+    for a key the table has not.
     """
     rows = [control(room, key) for key in (*controls, *forget)]
     own = [
-        component.value if row.kind == "number" and row.default is None else None
+        component.value if row.kind in ("number", "systems") and row.default is None else None
         for row, component in zip(rows, controls.values(), strict=False)
     ]
     keys, usual, gone = json.dumps([row.key for row in rows]), json.dumps(own), json.dumps([None] * len(forget))
+    place = next((n for n, row in enumerate(rows[: len(controls)]) if row.kind == "systems"), -1)
     script = (
-        f"(...values) => {{ const usual = {usual}; window.mtpState?.keep({json.dumps(room)}, {keys}, "
-        f"[...values.map((value, i) => (value === usual[i] ? null : value)), ...{gone}]); }}"
+        f"(...values) => {{ const usual = {usual}; "
+        f"const as = (i) => JSON.stringify(values[i]) === JSON.stringify(usual[i]), same = {place} < 0 || as({place}); "
+        f"window.mtpState?.keep({json.dumps(room)}, {keys}, "
+        f"[...values.map((value, i) => (same && as(i) ? null : value)), ...{gone}]); }}"
     )
     for event in events:
         event(None, list(controls.values()), None, js=script, api_visibility="private")

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from playground.figures import stage as scene
 from playground.figures.stage import NOT_FRAMES, ORIGINAL_ID, Json
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 MPJPE_CARD = term("mpjpe")
 FIXED_GUIDANCE = (0, 1, 2, 3, 4)
+MARKS = {"[CLS]": "(begin)", "[SEP]": "(end)"}  # of the encoder, in plain words
 
 
 def score(
@@ -87,6 +89,35 @@ def guidance_scene(
         figures.append(scene.figure(f"g{g}", f"g = {g}", None, system.name, g=g, frames=frames))
     features = scene.features("live", pair.conditional, pair.unconditional, pair.mean, pair.std, guidance)
     return scene.payload(figures, [score(system, motion.frames, levels, palettes)], features)
+
+
+def words_strip(name: str, pieces: Sequence[str], weights: NDArray[np.float32]) -> Json:
+    """Attention [F, W'] to word pieces as a heat map under the score, words by frames.
+
+    The ramp ends at the largest share that a word gets: marks and full stops, which take the most of it whatever the
+    motion does, may lie beyond.
+    """
+    words, columns = readable_words(pieces, weights)
+    telling = [n for n, word in enumerate(words) if word not in MARKS.values() and any(map(str.isalnum, word))]
+    most = float(columns[:, telling].max()) if telling else 0.0
+    return scene.strip("attention", name, "of its attention", words, columns.T, most or None)
+
+
+def readable_words(pieces: Sequence[str], weights: NDArray[np.float32]) -> tuple[list[str], NDArray[np.float32]]:
+    """Word pieces as words [W'], their weights [F, W'] added up, in order; the encoder's marks are put in plain words.
+
+    "##ing" continues the word before it (WordPiece).
+    """
+    names: list[str] = []
+    columns: list[NDArray[np.float32]] = []
+    for n, piece in enumerate(pieces):
+        if piece.startswith("##") and names:
+            names[-1] += piece[2:]
+            columns[-1] = columns[-1] + weights[:, n]
+            continue
+        names.append(MARKS.get(piece, piece))
+        columns.append(weights[:, n])
+    return names, np.stack(columns, axis=1)
 
 
 def token_facts(levels: Sequence[Any], used: int | None = None) -> tuple[Fact, ...]:

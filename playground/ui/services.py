@@ -127,12 +127,21 @@ class Services:
         """Whether a root refiner is shipped."""
         return self.engine().refines
 
-    def sampling(self) -> SamplingDefaults:
-        """How the default system generates where nothing else is asked for."""
+    def sampling(self, name: str = "") -> SamplingDefaults:
+        """How a system ("" for the one the page prefers) generates where nothing else is asked for."""
         try:
-            return self.default_system().sampling
+            return self.system(name).sampling
         except PlaygroundError:
             return SamplingDefaults()
+
+    def system(self, name: str = "") -> "SystemInfo":
+        """A shipped system by its name, "" for the one the page prefers. PlaygroundError if it is not shipped."""
+        if not name:
+            return self.default_system()
+        for system in self.shipped():
+            if system.name == name:
+                return system
+        raise PlaygroundError(f"the system {name} is not shipped with this copy; choose another one")
 
     def default_system(self) -> "SystemInfo":
         """The first shipped system that tokenizes and generates, or else the first one; PlaygroundError if none is."""

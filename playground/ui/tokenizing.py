@@ -13,9 +13,10 @@ from playground.figures import stage as scene
 from playground.figures.stage import ORIGINAL_ID, Json
 from playground.findings import ScaleSet
 from playground.motion.motion import Motion
+from playground.ui.cutting import part_of
 from playground.ui.energy import energy_bars
 from playground.ui.facts import Fact, millimetres
-from playground.ui.scenes import MPJPE_CARD, score, token_facts
+from playground.ui.scenes import MPJPE_CARD, score, token_facts, words_strip
 from playground.ui.services import Services
 from playground.ui.state import Scales
 from playground.ui.uploads import Source
@@ -49,6 +50,7 @@ class Session:
     example: str = ""  # id of an example, or UPLOADED
     source: Source | None = None
     start: float = 0.0  # second at which the window begins
+    part: int = 0  # of a long recording, from 1, between two still moments; 0 for a window that begins at `start`
     caption: str = ""
     tokenized: "Tokenized | None" = None
     upload: Source | None = None  # stays in the menu when an example is chosen
@@ -79,12 +81,15 @@ def open_session(services: Services, session: Session | None, opening: View) -> 
 
 def system_of(services: Services, session: Session) -> "SystemInfo":
     """The system that a session tokenizes with. PlaygroundError if it is not shipped."""
-    if not session.system:
-        return services.default_system()
-    for system in services.engine().systems():
-        if system.name == session.system and system.checkpoint == "shipped":
-            return system
-    raise PlaygroundError(f"the system {session.system} is not shipped with this copy; choose another one")
+    return services.system(session.system)
+
+
+def window_of(session: Session) -> tuple[int, int]:
+    """What is tokenized of the session's recording: its first pose and the pose after its last."""
+    source = session.source
+    if source is None:
+        raise PlaygroundError(NO_MOTION)
+    return part_of(source.motion, session.part) if session.part and source.is_long else source.edges(session.start)
 
 
 def ready(services: Services, session: Session) -> Session:
@@ -93,7 +98,7 @@ def ready(services: Services, session: Session) -> Session:
         raise PlaygroundError(NO_MOTION)
     if session.tokenized is not None:
         return session
-    window, name = session.source.window(session.start), system_of(services, session).name
+    window, name = session.source.motion.slice(*window_of(session)), system_of(services, session).name
     tokenized = services.engine().tokenize(window, session.caption, system=name)
     return replace(session, tokenized=tokenized, caption=tokenized.caption, found=Findings())
 
@@ -196,30 +201,8 @@ def _language_scene(services: Services, held: Session, language: "Language") -> 
     words = "another code without words" if held.found.marked == "bare" else "another code with the wrong words"
     track = _track(services, held, language.captioned, flips, words)
     found = held.found.attention
-    strips = [] if found is None else [_attention_strip(found)]
+    strips = [] if found is None else [words_strip("Which words the detokenizer looks at", found.words, found.weights)]
     return _scene(held, figures, track, strips)
-
-
-def _attention_strip(found: "Attention") -> Json:
-    words, weights = readable_words(found.words, found.weights)
-    return scene.strip("attention", "Which words the detokenizer looks at", "of its attention", words, weights.T)
-
-
-def readable_words(pieces: Sequence[str], weights: NDArray[np.float32]) -> tuple[list[str], NDArray[np.float32]]:
-    """Word pieces as words [W'], their weights [F, W'] added up, in order; the encoder's marks are put in plain words.
-
-    "##ing" continues the word before it (WordPiece).
-    """
-    names: list[str] = []
-    columns: list[NDArray[np.float32]] = []
-    for n, piece in enumerate(pieces):
-        if piece.startswith("##") and names:
-            names[-1] += piece[2:]
-            columns[-1] = columns[-1] + weights[:, n]
-            continue
-        names.append({"[CLS]": "(begin)", "[SEP]": "(end)"}.get(piece, piece))
-        columns.append(weights[:, n])
-    return names, np.stack(columns, axis=1)
 
 
 def _original(tokenized: "Tokenized") -> Json:
@@ -242,5 +225,5 @@ def _track(
 
 
 def _scene(held: Session, figures: list[Json], track: Json, strips: Sequence[Json] = ()) -> Json:
-    shown = f"{held.example}|{held.source and held.source.title}|{held.start}|{held.system}|{held.caption}"
+    shown = f"{held.example}|{held.source and held.source.title}|{held.start}|{held.part}|{held.system}|{held.caption}"
     return scene.payload(figures, [track], strips=strips, scene=shown)

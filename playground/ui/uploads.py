@@ -37,8 +37,12 @@ class Source:
 
     def window(self, start_seconds: float = 0.0) -> Motion:
         """The part that is tokenized: one window from `start_seconds`, moved back where it would run out."""
+        return self.motion.slice(*self.edges(start_seconds))
+
+    def edges(self, start_seconds: float = 0.0) -> tuple[int, int]:
+        """First pose of that window and the pose after its last."""
         start = round(min(max(0.0, float(start_seconds)), self.last_start) * LIMITS.fps)
-        return self.motion.slice(start, start + WINDOW)
+        return start, min(start + WINDOW, self.motion.frames)
 
 
 def read_upload(path: str | None) -> Source:

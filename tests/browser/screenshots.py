@@ -12,10 +12,10 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tests.browser.server import CHROMIUM_FLAGS, ROOT, chromium, serving
 
-ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit", "Compare")
+ROOMS = ("Tokenize", "Embedding map", "Codebooks", "Generate", "Guidance", "Edit", "Compare", "Endless", "Learn")
 SIZES = {"desktop": {"width": 1280, "height": 720}, "phone": {"width": 390, "height": 844}}
 STANDING = 1_500  # milliseconds for charts to be drawn and figures to take a step
-STAGES = ["tokenize", "embedding", "generate", "guidance", "edit", "compare"]
+STAGES = ["tokenize", "embedding", "generate", "guidance", "edit", "compare", "endless"]
 LATER = f"() => {STAGES}.forEach((name) => MotionStage.get(name)?.seek(24))"
 
 

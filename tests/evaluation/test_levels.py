@@ -14,7 +14,7 @@ from playground.evaluation.items import measurable
 from playground.evaluation.levels import measure_levels
 from playground.evaluation.metrics import fid
 from playground.evaluation.published import contents
-from playground.evaluation.published.alignment import ORDERS, alignment, attention_of, coarse
+from playground.evaluation.published.alignment import ORDERS, alignment, coarse
 from playground.evaluation.published.base import Settings
 from playground.evaluation.published.levels import levels
 from playground.evaluation.run import reconstruct
@@ -95,9 +95,9 @@ def test_orders_and_attention(place: Place) -> None:
     assert [(row["first"], row["second"]) for row in result.rows] == list(ORDERS)
     row = result.rows[0]
     made = engine.generate(row["prompt"], row["seconds"], SYSTEM, seed=2)
-    what, words, weights = attention_of(engine, made, row["prompt"])
-    assert row["words"] == words and "detokenizer" in what and weights.shape == (made.motion.frames, len(words))
-    assert row["lag"] == pytest.approx(attention_lag(weights, *clauses(words)), abs=1e-6)
+    seen = engine.alignment(made)
+    assert row["words"] == seen.words and row["what"] == seen.what and "detokenizer" in seen.what
+    assert row["lag"] == pytest.approx(attention_lag(seen.weights, *clauses(seen.words)), abs=1e-6)
     assert np.array(row["weights"]).sum(axis=1) == pytest.approx(1.0, abs=1e-3)
     assert coarse(np.arange(5.0)[:, None], 2)[:, 0].tolist() == [1.0, 3.5]
 

@@ -259,7 +259,7 @@ def test_check_may_stop_between_steps():
 def test_levels_of_several_lengths_are_refused_and_presets_have_their_size():
     with pytest.raises(ValueError, match="same number of tokens"):
         RQHCTransformer(replace(TINY, scales=(3, 6, 12)))
-    assert 2e6 < sum(p.numel() for p in RQHCTransformer(HIERARCHICAL_PRESETS["lite"]).parameters()) < 4e6
+    assert 1e6 < sum(p.numel() for p in RQHCTransformer(HIERARCHICAL_PRESETS["lite"]).parameters()) < 2e6
     with torch.device("meta"):
         full = RQHCTransformer(HIERARCHICAL_PRESETS["full"])
     assert [decoder.layers[0].attention.distances.shape[2] for decoder in full.decoders] == [64, 85, 170, 512, 512, 512]

@@ -1,6 +1,7 @@
 """The other systems' ablations: a table whose rows differ in one thing, and its queue on models that train at once."""
 
 import json
+import shutil
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from playground.data.library import Library, LibraryClip, write_library
 from playground.generators.hierarchical import HierarchicalConfig
 from playground.tokenizers.convolutional import ConvConfig
 from playground.training import ablations_others as table
+from playground.training import record
 from playground.training.configs import GeneratorTraining, Schedule, TokenizerTraining
 from tests.conftest import drifting
 
@@ -72,6 +74,13 @@ def test_a_tokenizer_differs_from_its_base_in_one_thing_and_can_be_built(base: s
         assert build(fitted(replace(training.model, width=8), code_width=8)) is not None
 
 
+def test_text_in_front_and_across_differ_in_that_alone() -> None:
+    found = table.trainings()
+    front, across = found["snap-in-context"], found["snap-cross-middle"]
+    assert front.model.variant != across.model.variant and replace(front.model, variant="cross") == across.model
+    assert replace(front, model=across.model) == across
+
+
 def test_a_library_without_a_source(library: Path, tmp_path: Path) -> None:
     whole = Library.open(library)
     left = Library.open(table.library_without(whole, table.HELD_OUT, tmp_path / "left"))
@@ -83,7 +92,9 @@ def test_a_library_without_a_source(library: Path, tmp_path: Path) -> None:
     assert (tmp_path / "left" / "joints.f32").stat().st_mtime_ns == stamp
 
 
-def test_the_queue_measures_what_it_has_trained(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_queue_measures_what_it_has_trained(
+    library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     trainings = {
         "mogo-base": TOKENIZER,
         "mogo-uniform": GENERATOR,
@@ -91,12 +102,12 @@ def test_the_queue_measures_what_it_has_trained(library: Path, tmp_path: Path, m
         "snap-base": replace(TOKENIZER, seed=1),
     }
     rows = (
-        table.Row("mogo3", "6 levels", "mogo-base"), table.Row("mogo4", "uniform", "mogo-uniform"),
-        table.Row("mogo1", "MOGO", "mogo-heldout", table.HELD_OUT), table.Row("snap4", "base", "snap-base"),
+        record.Row("mogo3", "6 levels", "mogo-base"), record.Row("mogo4", "uniform", "mogo-uniform"),
+        record.Row("mogo1", "MOGO", "mogo-heldout", table.HELD_OUT), record.Row("snap4", "base", "snap-base"),
     )  # fmt: skip
     monkeypatch.setattr(table, "trainings", lambda: trainings)
     monkeypatch.setattr(table, "ROWS", rows)
-    monkeypatch.setattr(table, "evaluator_path", lambda name: tmp_path / "absent")
+    monkeypatch.setattr(record, "evaluator_path", lambda name: tmp_path / "absent")
     where = ["--library", str(library), "--out", str(tmp_path / "runs"), "--results", str(tmp_path / "a.json")]
     where += ["--accelerator", "cpu", "--precision", "32-true"]
     assert table.main([*where, "--only", "mogo-base", "mogo-uniform", "mogo-heldout"]) == 0
@@ -108,11 +119,20 @@ def test_the_queue_measures_what_it_has_trained(library: Path, tmp_path: Path, m
     assert [point["step"] for point in drawn["validation"]] == [1, 2] and drawn["parameters"] > 0
     assert unseen["n"] == 3 and unseen["measured_on"] == table.HELD_OUT and "mpjpe_mm" not in absent
     assert "walks" not in (tmp_path / "a.json").read_text()  # no captions of the data
-    kept = tmp_path / "runs" / "mogo-base" / "measured-tokenizer.json"
+    kept = tmp_path / "runs" / "mogo-base" / "measured.json"
     stamp = kept.stat().st_mtime_ns
     again = table.measure_again(library, tmp_path / "runs")
     assert again["rows"] == found["rows"] and kept.stat().st_mtime_ns == stamp
-    assert again["made_by"] == "make ablations-others"
+    assert again["made_by"] == "make ablations-others" and drawn["tokenizer"] == first["checkpoint"]
+    assert drawn["sampling"] == vars(table.SYSTEMS["mogo"].sampling) and first["config"] != drawn["config"]
+    shutil.rmtree(tmp_path / "runs")  # another machine, where a generator is missing and its tokenizer is stored
+    lost = [row | {"status": record.NOT_TRAINED} if row["run"] == "mogo-uniform" else row for row in found["rows"]]
+    (tmp_path / "a.json").write_text(json.dumps(found | {"rows": lost}))
+    assert table.main([*where, "--only", "mogo-uniform", "mogo-heldout"]) == 0
+    later = json.loads((tmp_path / "a.json").read_text())["rows"]
+    assert later[1]["tokenizer"] == later[0]["checkpoint"] and later[1]["gfid"] == drawn["gfid"]
+    assert later[2] == unseen and not (tmp_path / "runs" / "mogo-heldout").exists()
+    assert "mogo-base is stored as measured" in capsys.readouterr().out
 
 
 def test_bad_calls_are_told(library: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from playground.motion.representation import Normaliser
 from playground.systems import checkpoint_path
 from playground.text.encoders import identify, load_encoder
 from playground.tokenizers.transformer import build_tokenizer
-from playground.training import ablations, ship, train_family
+from playground.training import ablations, record, ship, train_family
 from playground.training.configs import GeneratorTraining, Schedule, TokenizerTraining
 from playground.training.loop import Launch
 from playground.training.queue import Job, Limits, alone, chosen, left, run_queue, status
@@ -215,13 +216,11 @@ def test_every_ablation_differs_from_the_base_in_one_thing_and_can_be_built(size
 
 def test_results_say_what_is_trained_and_what_is_not(library, tmp_path, monkeypatch):
     table = {"base": TOKENIZER, "gelu": replace(TOKENIZER, model=replace(MODEL, feed="gelu"))}
-    rows = (
-        ablations.Row("4b", "SwiGLU", "base"), ablations.Row("4b", "GELU", "gelu"), ablations.Row("4c", "skips", "base")
-    )  # fmt: skip
+    rows = (record.Row("4b", "SwiGLU", "base"), record.Row("4b", "GELU", "gelu"), record.Row("4c", "skips", "base"))
     monkeypatch.setattr(ablations, "ROWS", rows)
     monkeypatch.setattr(ablations, "BATCHES", ())
     monkeypatch.setattr(ablations, "ablations", lambda size: table)
-    monkeypatch.setattr(ablations, "evaluator_path", lambda name: tmp_path / "absent")
+    monkeypatch.setattr(record, "evaluator_path", lambda name: tmp_path / "absent")
     where = ["--library", str(library), "--out", str(tmp_path / "runs"), "--results", str(tmp_path / "r" / "a.json")]
     where += ["--accelerator", "cpu", "--precision", "32-true"]
     assert ablations.main([*where, "--only", "base"]) == 0
@@ -239,6 +238,9 @@ def test_results_say_what_is_trained_and_what_is_not(library, tmp_path, monkeypa
     found = json.loads((tmp_path / "r" / "a.json").read_text())
     assert [row["status"] for row in found["rows"]] == ["trained"] * 3 and kept.stat().st_mtime == 1  # not again
     assert found["provenance"]["data"] == "tiny library" and found["made_by"] == "make ablations"
+    shutil.rmtree(tmp_path / "runs")  # another machine
+    assert ablations.main(where) == 0
+    assert json.loads((tmp_path / "r" / "a.json").read_text()) == found and not (tmp_path / "runs").exists()
 
 
 def test_measured_errors_are_those_of_evaluate(library, tmp_path):

@@ -22,7 +22,7 @@ from playground.motion.motion import Motion
 from playground.motion.representation import to_features67
 from playground.motion.synthetic import corpus
 from playground.results import Decoded, Example, GenerationStep, GuidancePair, Tokenized
-from playground.systems import SystemInfo
+from playground.systems import SYSTEMS, SystemInfo
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 from tests.ui.double_drawing import Drawing
@@ -31,6 +31,7 @@ from tests.ui.double_studies import Studies, shaken
 
 SIZES = (1, 2, 3, 4, 6, 8, 12, 18, 26, 36)
 CODES = (128, 128, 192, 192, 256, 256, 320, 320, 384, 384)
+DENOISER, DENOISED = "mdm-casim-decoder", 4  # a system without tokens, and its steps
 KINDS = ("synthetic", "generated", "decoded clip")
 
 
@@ -76,10 +77,14 @@ def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
 
 
 class FakeEngine(Drawing, Studies, Endless):
-    """What the rooms use of the engine. `pause` is called before every scale of a generation."""
+    """What the rooms use of the engine. `pause` is called before every scale of a generation.
 
-    def __init__(self, pause: Callable[[], None] = lambda: None) -> None:
+    denoises: with a second system, DENOISER, that makes motions without tokens.
+    """
+
+    def __init__(self, pause: Callable[[], None] = lambda: None, denoises: bool = False) -> None:
         self.pause = pause
+        self.denoises = denoises
         self.calls: list[str] = []
         self.assets = Path(tempfile.mkdtemp(prefix="stand-in-"))
         write_bundle(self.assets / "analysis", stored_analysis())
@@ -87,17 +92,19 @@ class FakeEngine(Drawing, Studies, Endless):
     def systems(self) -> list[SystemInfo]:
         facts: dict[str, Any] = {}
         name, text = "LG-Tok transformer", "minilm"
-        return [
-            SystemInfo("lgtok-lite", "LG-Tok lite", "lgtok", name, "sar", text, 13_000_000, "none", "shipped", facts)
-        ]
+        own = SystemInfo("lgtok-lite", "LG-Tok lite", "lgtok", name, "sar", text, 13_000_000, "none", "shipped", facts)
+        other = replace(own, name=DENOISER, title="MDM with CASIM, decoder", family="mdm", tokenizer=None)
+        return [own, replace(other, sampling=SYSTEMS[DENOISER].sampling)] if self.denoises else [own]
 
     def scales(self, system: str) -> list[tuple[int, int]]:
-        return list(zip(SIZES, CODES, strict=True))
+        return [] if system == DENOISER else list(zip(SIZES, CODES, strict=True))
 
     def sizes(self, system: str, frames: int) -> tuple[int, ...]:
-        return SIZES
+        return () if system == DENOISER else SIZES
 
     def codebooks(self, system: str) -> list[NDArray[np.float64]]:
+        if system == DENOISER:
+            return []
         rng = np.random.default_rng(3)
         return [rng.normal(size=(codes, 8)) for codes in CODES]
 
@@ -153,7 +160,11 @@ class FakeEngine(Drawing, Studies, Endless):
         clean = replace(source, joints=np.resize(source.joints, (frames, 22, 3)))
         rng = np.random.default_rng(1)
         entropy: list[NDArray[np.float32]] = []
-        for n in range(1, len(levels) + 1):
+        for n in range(1, (DENOISED if system == DENOISER else 0) + 1):
+            self.pause()
+            motion = shaken(clean, 0.4 * 0.7**n)
+            yield GenerationStep(n, (), (), motion, _features(motion), DENOISED)
+        for n in range(1, (0 if system == DENOISER else len(levels)) + 1):
             self.pause()
             entropy.append(rng.uniform(0, 5, SIZES[n - 1]).astype(np.float32))
             motion = shaken(clean, 0.4 * 0.7**n)

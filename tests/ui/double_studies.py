@@ -12,10 +12,10 @@ from playground.engine.checks import check_code, whole
 from playground.engine.codes import nearest
 from playground.engine.microscope import with_code
 from playground.errors import PlaygroundError
-from playground.findings import Attention, Language, Neighbours, Placed, ScaleSet, ScaleStudy, Swap
+from playground.findings import Alignment, Attention, Language, Neighbours, Placed, ScaleSet, ScaleStudy, Swap
 from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
-from playground.results import Decoded, Tokenized
+from playground.results import Decoded, Generation, Tokenized
 from playground.tokenizers.token_file import LevelTokens
 
 
@@ -91,6 +91,22 @@ class Studies:
         weights = np.random.default_rng(2).uniform(size=(result.motion.frames, len(words)))
         weights = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
         return Attention(words, weights, weights[None, None], 4, 0.02)
+
+    def looks_at_words(self, system: str) -> bool:
+        return True
+
+    def alignment(self, made: Generation) -> Alignment:
+        self.calls.append(f"alignment {made.seed}")
+        if not made.prompt:
+            raise PlaygroundError("this motion was drawn without words, so no moment looked at any")
+        words = ["[CLS]", *made.prompt.split(), ".", "[SEP]"]
+        weights = np.random.default_rng(made.seed).uniform(size=(2, made.motion.frames, len(words)))
+        weights[:, :, 0] += 4  # marks take most of it
+        by_step = (weights / weights.sum(axis=-1, keepdims=True)).astype(np.float32)
+        what = "detokenizer, mean over layers and heads"
+        if not made.levels:
+            what = "last layer of the denoiser, mean over steps and heads"
+        return Alignment(made.system, "fake", what, words, by_step.mean(axis=0), by_step, 1, 0.02)
 
     def place(self, result: Any, system: str | None = None, each: str = "clip") -> Placed:
         self.calls.append(f"place {each}")

@@ -15,9 +15,10 @@ from playground.errors import PlaygroundError
 from playground.ui import tokencard
 from playground.ui.closer import Closer
 from playground.ui.rooms import tokenize
+from playground.ui.scenes import readable_words
 from playground.ui.services import Services
 from playground.ui.state import Token, parse
-from playground.ui.tokenizing import Session, readable_words, run, scales_of, stage_of
+from playground.ui.tokenizing import Session, run, scales_of, stage_of
 from playground.ui.uploads import Source
 from tests.ui.double import CODES, SIZES, FakeEngine, motions, stored_analysis
 

@@ -26,9 +26,10 @@ from playground.ui.drawing import (
     wish_values,
     write_changes,
 )
+from playground.ui.drawviews import controls
 from playground.ui.errors import Noted
 from playground.ui.generated import drawing_view, earlier, onward, result_view, token_card
-from playground.ui.rooms.generate import SHOWN, Handlers, _controls
+from playground.ui.rooms.generate import SHOWN, Handlers
 from playground.ui.services import Services
 from playground.ui.state import State, parse, query
 from playground.ui.view import View
@@ -102,10 +103,13 @@ def test_a_link_plants_feet_where_there_is_a_refiner(services: Services, monkeyp
     assert not Wish.checked(*wish_values(services, state)).plant
 
 
-def test_the_switch_stands_in_the_room_where_there_is_a_refiner() -> None:
+def test_the_switch_stands_in_the_room_where_there_is_a_refiner(
+    services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for there in (True, False):
+        monkeypatch.setattr(FakeEngine, "refines", there)
         with gr.Blocks():
-            *_, plant, _ = _controls(View(stage={}), there)
+            *_, plant, _ = controls(View(stage={}), services)
         assert plant.visible is there and plant.value is False
         assert plant.label == "Plant the feet" and "tokens stay the same" in plant.info
 

@@ -41,58 +41,27 @@ def alignment(system: str, settings: Settings, engine: Engine, progress: Progres
         kept = [in_order(first, second, one.motion.joints) for one in made]
         row = {"prompt": prompt, "first": first, "second": second, "seconds": made[0].motion.seconds}
         row |= {"kept": measured([np.nan if one is None else float(one) for one in kept])}
-        rows.append(row | _looked(engine, made[0], prompt))
+        rows.append(row | _looked(engine, made[0]))
         if progress:
             progress(number, len(ORDERS))
     facts = {"seed": settings.seed, "motions": settings.motions, "sampling": vars(made[0].sampling)}
     return Result("alignment", "", about(engine, system) | facts, rows)
 
 
-def _looked(engine: Engine, made: Generation, prompt: str) -> dict[str, Any]:
+def _looked(engine: Engine, made: Generation) -> dict[str, Any]:
     """The attention to words of one motion, as a row holds it."""
     try:
-        what, words, weights = attention_of(engine, made, prompt)
+        found = engine.alignment(made, deadline=None)
     except PlaygroundError as error:
         return {"words": None, "weights": None, "what": None, "lag": None, "why": str(error)}
-    lag = attention_lag(weights, *clauses(words))
+    weights = np.asarray(found.weights, np.float64)
+    lag = attention_lag(weights, *clauses(found.words))
     return {
-        "words": words,
+        "words": found.words,
         "weights": np.round(coarse(weights, STEPS), 4).tolist(),
-        "what": what,
+        "what": found.what,
         "lag": lag if np.isfinite(lag) else None,
     }
-
-
-def attention_of(engine: Engine, made: Generation, prompt: str) -> tuple[str, list[str], Floats]:
-    """Which attention it is, the word pieces [W] and the weights [frames or tokens, W] of a motion of one prompt.
-
-    The generator's own where it looks at words (CASIM), else the detokenizer's. PlaygroundError where neither does.
-    """
-    runtime = engine.runtime(made.system)
-    source = runtime.generator if runtime.diffusion is None else runtime.diffusion
-    reads, text = getattr(source, "alignment", None), runtime.prompt(prompt)
-    if reads is None or text is None:
-        seen = engine.attention(made, prompt)
-        return "detokenizer, mean over layers and heads", seen.words, np.asarray(seen.weights, np.float64)
-    import torch
-
-    from playground.nn.sampling import Sampling
-    from playground.tokenizers.base import Tokens
-
-    lengths = torch.tensor([made.motion.frames])
-    try:
-        if runtime.diffusion is not None:
-            drawing = {key: value for key, value in vars(made.sampling).items() if key != "guidance"}
-            weights = reads(text, lengths, Sampling(**drawing, seeds=(made.seed,))).mean(dim=0)
-            what = "last layer of the denoiser, mean over steps and heads"
-        else:
-            ids = tuple(torch.from_numpy(level.ids.copy())[None] for level in made.levels)
-            weights = reads(Tokens(ids, tuple(level.codes for level in made.levels)), text, lengths)[0]
-            what = "last layer of the generator, mean over heads"
-    except ValueError:
-        raise PlaygroundError(f"the system {made.system} has no attention to single words to look at") from None
-    words = text.words[0]
-    return what, list(words), weights[:, : len(words)].double().numpy()
 
 
 def coarse(weights: Floats, steps: int) -> Floats:

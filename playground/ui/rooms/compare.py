@@ -11,25 +11,26 @@ from playground.limits import LIMITS
 from playground.motion.motion import Motion
 from playground.ui.compared import compared_view
 from playground.ui.comparing import (
+    ALONE,
     EDIT,
     MOTION,
     PROMPT,
     VARIATIONS,
     Compared,
     chosen,
-    is_origin,
+    first_variation,
     offered,
-    origin_caption,
-    origin_of,
     run,
     settings_of,
     span_of,
+    variation_of,
 )
 from playground.ui.drawing import MADE
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.inspector import inspector
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
+from playground.ui.origins import is_origin, origin_caption, origin_of
 from playground.ui.services import Services
 from playground.ui.state import State, control
 from playground.ui.view import View
@@ -38,7 +39,6 @@ NAME = "compare"
 LEAD = "One motion or prompt, several settings in sync. Choose what differs; the table says by how much."
 DOING = "Running every setting"
 WISHES = ("vary", "values", "prompt", "seconds", "seed", "motion")  # keys of the table of controls
-USUAL = str(control(NAME, "vary").default)
 KEEP = """(vary, values, prompt, seconds, seed, motion) => window.mtpState?.keep(
   'compare', ['vary', 'values', 'prompt', 'seconds', 'seed', 'motion', 'take', 'selection'],
   [vary, [...values].sort((a, b) => a - b || 0).join('_'), prompt, seconds, seed, motion, null, null]);"""
@@ -81,10 +81,10 @@ def compare(services: Services, held: Held, *values: Any, take: int = 0) -> Iter
 
 
 def opening_view(services: Services) -> View:
-    """The room's first result: a motion rebuilt from fewer and from more scales."""
-    example = services.opening_example()
-    picked = [name for _, name in chosen(services, USUAL, ())]
-    *_, last = compare(services, Held(), USUAL, picked, "", 4.0, 0, example.id, take=LAST)
+    """The room's first result: a motion through several systems; of a single one, from fewer and from more scales."""
+    example, vary = services.opening_example(), first_variation(services)
+    picked = [name for _, name in chosen(services, vary, ())]
+    *_, last = compare(services, Held(), vary, picked, "", 4.0, 0, example.id, take=LAST)
     return View(last.stage, controls={**last.controls, "motion": example.id}, seconds=last.seconds)
 
 
@@ -129,8 +129,9 @@ class Handlers:
         """A name in the table: its tokens. The stored opening is computed once more for that."""
         take = int(event.code)
         if not held.done:
-            picked = [name for _, name in chosen(self.services, USUAL, ())]
-            for _ in compare(self.services, held, USUAL, picked, "", 4.0, 0, None):
+            vary = first_variation(self.services)
+            picked = [name for _, name in chosen(self.services, vary, ())]
+            for _ in compare(self.services, held, vary, picked, "", 4.0, 0, None):
                 pass
         view = compared_view(self.services, held.done, held.source, held.name, take)
         return view.stage_json(), view.controls["table"], str(take)
@@ -138,7 +139,7 @@ class Handlers:
     def arrive(self, held: Held, event: gr.EventData) -> Iterator[tuple[Any, ...]]:
         """What a link asks for: the controls, then the results."""
         state = asked(event)
-        vary = state["vary"] if state["vary"] in [key for _, key in offered(self.services)] else USUAL
+        vary = variation_of(self.services, state["vary"])
         wanted = [name for _, name in chosen(self.services, vary, str(state["values"] or "").split("_"))]
         wanted = wanted[: VARIATIONS[vary].most]
         asked_for = str(state["motion"] or "")
@@ -208,17 +209,18 @@ def _wire(
 def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[Any], list[Any]]:
     """The controls by their keys, the rows for a prompt and for a motion, "Compare" and "Stop"."""
     found: dict[str, Any] = {}
-    variation, picked = VARIATIONS[USUAL], [name for _, name in chosen_or_none(services)]
+    first = first_or_alone(services)
+    variation, picked = VARIATIONS[first], [name for _, name in chosen_or_none(services)]
     with gr.Row(elem_classes=["mtp-line"]):
         found["vary"] = gr.Dropdown(
-            offered_or_none(services), value=USUAL, label=control(NAME, "vary").label, elem_id="compare-vary", scale=1,
+            offered_or_none(services), value=first, label=control(NAME, "vary").label, elem_id="compare-vary", scale=1,
             min_width=160,
         )  # fmt: skip
         go = gr.Button("Compare", variant="primary", size="sm", scale=0, min_width=84, elem_id="compare-go")
         cancel = gr.Button("Stop", size="sm", scale=0, min_width=60, interactive=False, elem_id="compare-stop")
     found["values"] = gr.CheckboxGroup(
         list(variation.choices(services)) if picked else [], value=picked, elem_id="compare-values",
-        label=_choose(USUAL),
+        label=_choose(first),
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line"], visible=variation.of == PROMPT) as of_prompt:
         found["prompt"] = gr.Textbox(
@@ -246,9 +248,17 @@ def _choose(vary: str) -> str:
 def chosen_or_none(services: Services) -> list[tuple[str, str]]:
     """The choices of the first variation; none where no system is shipped."""
     try:
-        return chosen(services, USUAL, ())
+        return chosen(services, first_variation(services), ())
     except PlaygroundError:
         return []
+
+
+def first_or_alone(services: Services) -> str:
+    """What differs at first, also where no system is shipped."""
+    try:
+        return first_variation(services)
+    except PlaygroundError:
+        return ALONE
 
 
 def offered_or_none(services: Services) -> list[tuple[str, str]]:

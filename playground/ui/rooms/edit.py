@@ -7,6 +7,7 @@ from typing import Any
 import gradio as gr
 
 from playground.engine.editing import benchmark_span
+from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.ui.drawing import MADE, Wish, made_name, read_changes, wish_values
 from playground.ui.editing import (
@@ -88,6 +89,9 @@ class Handlers:
         """What the room Generate shows, by its address."""
         state = parse(address)
         wish = Wish.checked(*wish_values(self.services, state))
+        usual = self.services.system()
+        if wish.system != usual.name:
+            raise PlaygroundError(f"motions of {usual.title} are edited here; generate one with it to take it along")
         changes = read_changes(state["changes"])
         seed = wish.seed if changes else wish.seeds[min(int(state["take"]), wish.takes - 1)]
         name = made_name(wish, seed, changes)

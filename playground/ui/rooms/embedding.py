@@ -274,4 +274,5 @@ def _bind(do: Handlers, views: Views, session: gr.State, stage: gr.HTML, door: g
 
 
 def _listed(bundle: Bundle, rows: Sequence[int]) -> list[tuple[str, str]]:
-    return [(bundle.clips[row].caption or bundle.clips[row].action, bundle.clips[row].id) for row in rows]
+    clips = [bundle.clips[row] for row in rows]
+    return [(f"{c.caption or c.action} · {c.source}, {c.frames / LIMITS.fps:.1f} s", c.id) for c in clips]

@@ -2,14 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import astuple
-from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gradio as gr
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
-from playground.systems import SamplingDefaults
 from playground.ui.drawing import (
     WISHES,
     Change,
@@ -24,8 +22,17 @@ from playground.ui.drawing import (
     wish_values,
     write_changes,
 )
+from playground.ui.drawviews import NAME, OPENING_SECONDS, PROMPTS, controls, knobs, words_switch
 from playground.ui.errors import Noted, attach, message_place
-from playground.ui.generated import drawing_view, earlier, onward, result_view, token_card
+from playground.ui.generated import (
+    drawing_view,
+    earlier,
+    onward,
+    result_view,
+    token_card,
+    with_words,
+    words_card,
+)
 from playground.ui.inspector import inspector
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import asked, commits, link_door
@@ -35,28 +42,17 @@ from playground.ui.stage.component import stage_call
 from playground.ui.state import control
 from playground.ui.view import View
 
-NAME = "generate"
+if TYPE_CHECKING:
+    from playground.findings import Alignment
+    from playground.results import Generation
+
 LEAD = "Describe a motion. Its tokens are chosen scale by scale, and the figure sharpens. Then click a token."
-PROMPTS = (
-    control(NAME, "prompt").default,
-    "someone jogs",
-    "a person turns left while walking",
-    "a person is waving with both hands",
-)
-OPENING_SECONDS = float(control(NAME, "seconds").default)
-DOING = "Choosing the first tokens"
-GUIDANCES = (
-    "Two guidances: <b>s</b> acts while tokens are chosen and makes them follow the words; <b>g</b> leaves the tokens "
-    "as they are and changes how they are read."
-)
-PLANT = (
-    "The way over the ground is computed anew from how the body moves, so that standing feet slide less; the tokens "
-    "stay the same."
-)
-STEPS = (0.1, 0.1, 0.05, 0.01, 0.01)  # of the sampling sliders
+DOING, LOOKING = "Beginning", "Looking at the words"
 KEEP = "(changes, take) => window.mtpState?.keep('generate', ['changes', 'take'], [changes || null, +take || null])"
+REVEAL = """(on) => on && requestAnimationFrame(() => requestAnimationFrame(
+  () => document.querySelector('#generate-score')?.scrollIntoView({ block: 'nearest' })))"""  # the map may lie below
 SKIP = gr.skip()
-SHOWN = 7 + len(WISHES)  # values that show a result
+SHOWN = 9 + len(WISHES)  # values that show a result
 
 
 def stream(services: Services, wish: Wish) -> Iterator[View]:
@@ -80,7 +76,8 @@ class Handlers:
     """What the controls do. A generation looks at its visit after every scale, so that stopping waits for nobody.
 
     A handler that shows a result returns the values of SHOWN in `room`: stage, facts, where to go next, the visit's
-    list, the choice among several motions, the changes for the address, the token's card.
+    list, the choice among several motions, the changes for the address, the token's card, the controls, the switch of
+    the words and what stands under it.
     """
 
     def __init__(self, services: Services) -> None:
@@ -90,7 +87,13 @@ class Handlers:
         """The controls as a link asks for them, in the order of `Wish.checked`."""
         state = asked(event)
         visit.wanted, visit.take = read_changes(state["changes"]), int(state["take"])
-        return wish_values(self.services, state)
+        visit.words = bool(state["words"])
+        values = wish_values(self.services, state)
+        return *values, self._switch(visit.words, str(values[-1]))
+
+    def settle(self, system: str, visit: Visit) -> tuple[Any, ...]:
+        """Another system in the menu: its own sampling, and the switch of the words where it has one."""
+        return *astuple(self.services.sampling(system)), self._switch(visit.words, system)
 
     def begin(self, visit: Visit) -> tuple[Any, ...]:
         """At the click, before any waiting: "Stop" becomes possible and "Generate" does not."""
@@ -142,6 +145,14 @@ class Handlers:
         visit.token = int(event.selection["scale"]), int(event.selection["position"])
         return (self._card(visit, result),)
 
+    def look(self, on: bool, visit: Visit) -> tuple[Any, ...]:
+        """The switch of the words: the map of words by frames under the score, or not."""
+        visit.words = on is True
+        result = self._held(visit)
+        looked, why = self._looked(visit, result.takes[visit.take])
+        view = with_words(result_view(self.services, result, visit.take), looked)
+        return view.stage_json(), words_card(looked, why)
+
     def bring_back(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
         """A result of the visit, at once, with the controls that made it."""
         result = visit.open(int(event.code))
@@ -162,8 +173,8 @@ class Handlers:
                 return
             view = drawing_view(self.services, drawing, visit.take)
             visit.halted = visit.stop
-            level, count = view.controls["level"], view.controls["count"]
-            note = f"Stopped; this is the motion after scale {level} of {count}." if visit.halted else ""
+            level, count, unit = (view.controls[key] for key in ("level", "count", "unit"))
+            note = f"Stopped; this is the motion after {unit} {level} of {count}." if visit.halted else ""
             yield Noted(view.stage_json(), note), view.facts_html(), *[SKIP] * (SHOWN - 2)
             if visit.halted:
                 return
@@ -172,10 +183,28 @@ class Handlers:
         choices = [(f"Seed {one.seed}", str(n)) for n, one in enumerate(result.takes)]
         which = gr.update(choices=choices, value=str(visit.take), visible=len(choices) > 1)
         card = self._card(visit, result) if visit.token else ""
-        told = ", then ".join(one.words for one in result.changes)
-        stage = Noted(view.stage_json(), f"{told[:1].upper()}{told[1:]}." if told else "")
-        told_of = (onward(result, visit.take), earlier(visit), which, write_changes(result.changes), card)
-        return stage, view.facts_html(), *told_of, *(result.address[key] for key in WISHES)
+        told, made = ", then ".join(one.words for one in result.changes), result.takes[visit.take]
+        looked, why = self._looked(visit, made)
+        stage = Noted(with_words(view, looked).stage_json(), f"{told[:1].upper()}{told[1:]}." if told else "")
+        links = onward(result, visit.take, self.services.system().name)
+        told_of = (links, earlier(visit), which, write_changes(result.changes), card)
+        seen = (self._switch(visit.words, made.system), words_card(looked, why))
+        return stage, view.facts_html(), *told_of, *(result.address[key] for key in WISHES), *seen
+
+    def _looked(self, visit: Visit, made: "Generation") -> tuple["Alignment | None", str]:
+        """Which words a motion looked at, if the visitor wants to see it; or why there is nothing to see."""
+        engine = self.services.engine()
+        if not visit.words or not engine.looks_at_words(made.system):
+            return None, ""
+        if visit.looked is None or visit.looked[0] is not made:
+            try:
+                visit.looked = made, engine.alignment(made)
+            except PlaygroundError as error:  # no prompt
+                return None, str(error)
+        return visit.looked[1], ""
+
+    def _switch(self, on: bool, system: str) -> Any:
+        return gr.update(value=on, visible=self.services.engine().looks_at_words(system))
 
     def _card(self, visit: Visit, result: Result) -> str:
         assert visit.token is not None
@@ -204,31 +233,39 @@ def room(services: Services) -> None:
         with panel("Words become a motion", LEAD, compare=True):
             card = inspector(elem_id="generate-token")
             with gr.Column(elem_classes=["mtp-form"], min_width=0):
-                prompt, seconds, seed, takes, plant, buttons = _controls(opening, services.refines())
+                prompt, system, seconds, seed, takes, plant, buttons = controls(opening, services)
             which = gr.Radio([], label=control(NAME, "take").label, visible=False, elem_id="generate-take",
                              elem_classes=["mtp-segments"])  # fmt: skip
             message = message_place("generate-message")
             facts = gr.HTML(opening.facts_html(), elem_id="generate-facts", apply_default_css=False)
+            switch, looked = words_switch(services)
             further = gr.HTML("", elem_id="generate-onward", apply_default_css=False)
             shelf = inspector(elem_id="generate-earlier")
-            free, *numbers = _knobs(services.sampling())
+            free, *numbers = knobs(services.sampling())
             rewriter(NAME, prompt)
         words(NAME)
         door = link_door(NAME)
         changes = gr.Textbox("", elem_classes=["mtp-unseen"], show_label=False, container=False)
-    wishes = [prompt, free, seconds, seed, *numbers, takes, plant]
-    shown = [stage, facts, further, shelf, which, changes, card, *wishes]
-    _wire(Handlers(services), visit, message, shown, buttons, door)
+    wishes = [prompt, free, seconds, seed, *numbers, takes, plant, system]
+    shown = [stage, facts, further, shelf, which, changes, card, *wishes, switch, looked]
+    do = Handlers(services)
+    _wire(do, visit, message, shown, buttons, door)
+    quick: dict[str, Any] = {"model": False, "trigger_mode": "always_last"}
+    attach(system.input, do.settle, [system, visit], [*numbers, switch], message, **quick)
+    seen: dict[str, Any] = {"stage": NAME, "doing": LOOKING, "trigger_mode": "always_last"}
+    shown_words = attach(switch.input, do.look, [switch, visit], [stage, looked], message, **seen)
+    shown_words.then(None, [switch], None, js=REVEAL, api_visibility="private")
+    commits(NAME, {"words": switch}, switch.input)
 
 
 def _wire(do: Handlers, visit: Any, message: Any, shown: list[Any], buttons: list[Any], door: Any) -> None:
     """What happens at which event."""
-    stage, _, _, shelf, which, changes, card, *wishes = shown
+    stage, _, _, shelf, which, changes, card, *wishes, switch, _ = shown
     prompt, (go, cancel) = wishes[0], buttons
     quick: dict[str, Any] = {"queue": False, "api_visibility": "private", "show_progress": "hidden"}
     silent: dict[str, Any] = {"api_visibility": "private"}
     keys = dict(zip(WISHES, wishes, strict=True))
-    filled = attach(door.arrive, do.fill, [visit], wishes, message, model=False)
+    filled = attach(door.arrive, do.fill, [visit], [*wishes, switch], message, model=False)
     for event in (go.click, prompt.submit, filled.then):
         started = event(do.begin, [visit], buttons, **quick)
         run = attach(started.then, do.generate, [visit, *wishes], shown, message, stage=NAME, doing=DOING)
@@ -244,52 +281,8 @@ def _wire(do: Handlers, visit: Any, message: Any, shown: list[Any], buttons: lis
     started = card.act(do.choose, [visit], buttons, **quick)
     again = attach(started.then, do.redraw, [visit], shown, message, stage=NAME, doing="Drawing anew")
     again.then(do.end, None, buttons, **quick)
-    back = attach(shelf.act, do.bring_back, [visit], shown, message, model=False)
-    look = attach(which.input, do.look_at, [visit, which], shown, message, model=False)
+    back = attach(shelf.act, do.bring_back, [visit], shown, message)
+    look = attach(which.input, do.look_at, [visit, which], shown, message)
     for run in (again, back, look):
         run.then(None, [changes, which], None, js=KEEP, **silent)
     commits(NAME, keys, again.then, back.then)
-
-
-def _controls(opening: View, refines: bool) -> tuple[Any, ...]:
-    """From top to bottom: prompt, seconds, seed, seeds side by side, "Plant the feet" if there is a root refiner,
-    "Generate" and "Stop"."""
-    prompt = gr.Textbox(
-        opening.controls.get("prompt", PROMPTS[0]), label="Prompt", lines=2, max_lines=3,
-        placeholder=PROMPTS[0], elem_id="generate-prompt",
-    )  # fmt: skip
-    gr.Examples([[text] for text in PROMPTS], [prompt], label="Try one of these", elem_id="generate-examples")
-    with gr.Row(elem_classes=["mtp-line"]):
-        seconds = gr.Slider(
-            LIMITS.min_seconds, LIMITS.max_seconds, value=OPENING_SECONDS, step=0.2, label="Seconds",
-            elem_id="generate-seconds", min_width=160,
-        )  # fmt: skip
-        seed = gr.Number(
-            0, label="Seed", precision=0, minimum=0, maximum=LIMITS.max_seed, elem_id="generate-seed",
-            min_width=72, scale=0,
-        )  # fmt: skip
-        takes = gr.Number(
-            1, label=control(NAME, "takes").label, precision=0, minimum=1, maximum=LIMITS.max_seeds,
-            elem_id="generate-takes", min_width=96, scale=0,
-        )  # fmt: skip
-    plant = gr.Checkbox(
-        False, label=control(NAME, "plant").label, info=PLANT, visible=refines, elem_id="generate-plant"
-    )
-    with gr.Row(elem_classes=["mtp-line"]):
-        go = gr.Button("Generate", variant="primary", size="sm", elem_id="generate-go")
-        cancel = gr.Button("Stop", variant="secondary", size="sm", interactive=False, elem_id="generate-stop")
-    return prompt, seconds, seed, takes, plant, [go, cancel]
-
-
-def _knobs(default: SamplingDefaults) -> list[Any]:
-    """The folded sampling controls in the order of `Wish.checked`; the first one is free-form."""
-    with gr.Accordion("Sampling and guidance", open=False, elem_classes=["mtp-knobs"]):
-        gr.HTML(f'<p class="mtp-aside">{GUIDANCES}</p>', apply_default_css=False)
-        with gr.Row(elem_classes=["mtp-pairs"]):
-            rows = map(partial(control, NAME), WISHES[4:9])
-            guidance, cfg, temperature, top_k, top_p = (
-                gr.Slider(row.low, row.high, value, step=step, label=row.label, elem_id=row.element)
-                for row, value, step in zip(rows, astuple(default), STEPS, strict=True)
-            )
-            free = gr.Checkbox(False, label=control(NAME, "free").label, elem_id="generate-free")
-    return [free, guidance, cfg, temperature, top_k, top_p]

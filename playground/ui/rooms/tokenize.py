@@ -8,13 +8,15 @@ from playground.limits import LIMITS
 from playground.ui.chart import chart
 from playground.ui.closer import Closer
 from playground.ui.closerviews import bind_closer, closer_views
+from playground.ui.cutting import HEIGHT as CURVE
+from playground.ui.cutting import LABEL, cut, cuts_figure, part_choices, part_of
 from playground.ui.energy import HEIGHT, LABELS
 from playground.ui.errors import Noted, attach, message_place
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, UPLOADED, State, Token, control
-from playground.ui.tokenizing import NAME, Session, open_session, run, scales_of
+from playground.ui.tokenizing import NAME, Session, open_session, run, scales_of, window_of
 from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
 
@@ -39,7 +41,7 @@ def opening_view(services: Services) -> View:
 def preset_view(services: Services, wanted: str) -> View:
     """The result for an example with its own caption, all scales."""
     example = services.example(wanted)
-    return run(services, Session(wanted, Source(example.motion(), example.title), 0.0, example.caption))[1]
+    return run(services, Session(wanted, Source(example.motion(), example.title), caption=example.caption))[1]
 
 
 class Handlers:
@@ -58,10 +60,10 @@ class Handlers:
         found = self.services.example(wanted)
         stored = self.services.preset(NAME, wanted) if system in ("", self.services.default_system().name) else None
         if stored is not None:
-            held = Session(wanted, None, 0.0, found.caption, upload=upload, system=system)
+            held = Session(wanted, caption=found.caption, upload=upload, system=system)
             return self._told(held, stored)
         source = Source(found.motion(), found.title)
-        return self._show(Session(wanted, source, 0.0, found.caption, upload=upload, system=system))
+        return self._show(Session(wanted, source, caption=found.caption, upload=upload, system=system))
 
     def bring(self, path: str | None, held: Session | None) -> tuple[Any, ...]:
         """A file of the visitor's own, with the caption that it carries, if any."""
@@ -76,7 +78,20 @@ class Handlers:
 
     def move(self, second: float, held: Session | None) -> tuple[Any, ...]:
         """Another window of a long motion."""
-        return self._show(self._open(held).forgetful(start=float(second)))
+        return self._show(self._open(held).forgetful(start=float(second), part=0))
+
+    def cut(self, part: str | None, held: Session | None) -> tuple[Any, ...]:
+        """A part of a long recording, between two still moments; ANYWHERE: the window where the slider stands."""
+        session = self._open(held)
+        number = int(part) if part and part.isascii() and part.isdigit() and len(part) < 4 else 0
+        source, start = session.source, session.start
+        if source:
+            start = part_of(source.motion, number)[0] / LIMITS.fps if number else min(start, source.last_start)
+        return self._show(session.forgetful(part=number, start=start))
+
+    def point(self, held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
+        """A click on the speed curve: the part that it is in."""
+        return self.cut(str(event.id), held)
 
     def change(self, system: str, held: Session | None) -> tuple[Any, ...]:
         """Another system."""
@@ -99,13 +114,16 @@ class Handlers:
         state = asked(event)
         wanted, upload, note = str(state["motion"] or ""), held.upload if held else None, ""
         if wanted.startswith(OWN_FILE) and upload is not None:
-            session = Session(UPLOADED, upload, float(state["start"]), upload.caption, upload=upload)
+            part, start = int(state["part"]), float(state["start"])
+            start = part_of(upload.motion, part)[0] / LIMITS.fps if part and upload.is_long else start
+            session = Session(UPLOADED, upload, start, part, upload.caption, upload=upload)
         else:
             if wanted.startswith(OWN_FILE):
                 note = f"This link was made with a file of its maker's own, {wanted.removeprefix(OWN_FILE)}; upload it."
             known = {example.id: example for example in self.services.examples()}
             found = known.get(wanted) or self.services.opening_example()
-            session = Session(found.id, Source(found.motion(), found.title), 0.0, found.caption, upload=upload)
+            source = Source(found.motion(), found.title)
+            session = Session(found.id, source, caption=found.caption, upload=upload)
         session.caption = state.values.get("caption", session.caption)
         shipped = {system.name for system in self.services.shipped("tokenizer")}
         session.system = state.system if state.system in shipped else ""
@@ -129,12 +147,21 @@ class Handlers:
         own = [(f"{held.upload.title} · yours", UPLOADED)] if held.upload else []
         menu = gr.update(choices=[*own, *self.services.example_choices()], value=held.example)
         source = held.source
-        last = max(0.1, round(source.last_start, 1)) if source else 0.1
-        window = gr.update(visible=bool(source and source.is_long), maximum=last, value=held.start)
+        last = max(0.1, round(source.last_start, 1), held.start) if source else 0.1
+        window = gr.update(maximum=last, value=held.start)
         steps = gr.update(maximum=max(2, view.controls["count"]), value=view.controls["scales"])
         session, stage, *rest = self._parts(held, view)
         system = held.system or self.services.default_system().name
-        return session, Noted(stage, note), *rest, menu, held.caption, window, steps, view.controls["kind"], system
+        told = (menu, held.caption, window, steps, view.controls["kind"], system, *self._cuts(held))
+        return session, Noted(stage, note), *rest, *told
+
+    def _cuts(self, held: Session) -> tuple[Any, ...]:
+        """For a recording longer than a window: where it would be cut. The whole box, the menu of parts, the curve."""
+        if held.source is None or not held.source.is_long:
+            return gr.update(visible=False), gr.skip(), gr.skip()
+        found = cut(held.source.motion)
+        menu = gr.update(choices=part_choices(found), value=str(held.part))
+        return gr.update(visible=True), menu, cuts_figure(found, window_of(held))
 
     def _parts(self, held: Session, view: View) -> tuple[Any, ...]:
         bars = gr.update(value=view.charts["energy"], label=LABELS[view.controls["kind"]])
@@ -149,7 +176,7 @@ def room(services: Services) -> None:
         stage = stage_and_score(NAME, opening)
         with panel("A motion becomes tokens, and comes back", LEAD, compare=True):
             with gr.Column(elem_classes=["mtp-view", "mtp-view-motion"], min_width=0):
-                example, system, upload, caption, go, ask, start, kind, scales = _controls(services, opening)
+                example, system, upload, caption, go, ask, window, kind, scales = _controls(services, opening)
             message = message_place("tokenize-message")
             with gr.Column(elem_classes=["mtp-view", "mtp-view-motion"], min_width=0):
                 facts = gr.HTML(opening.facts_html(), elem_id="tokenize-facts", apply_default_css=False)
@@ -162,7 +189,8 @@ def room(services: Services) -> None:
         door = link_door(NAME)
     do = Handlers(services, opening)
     parts = [session, stage, facts, energy, views.card, views.told, views.swapped, views.misled]
-    everything = [*parts, example, caption, start, scales, kind, system]
+    box, part, start, curve = window
+    everything = [*parts, example, caption, start, scales, kind, system, box, part, curve]
     busy: dict[str, Any] = {"message": message, "stage": NAME, "doing": DOING}
     attach(example.input, do.choose, [example, session], everything, **busy)
     attach(system.input, do.change, [system, session], everything, **busy)
@@ -170,6 +198,8 @@ def room(services: Services) -> None:
     for event in (caption.submit, go.click):
         attach(event, do.again, [caption, session], everything, **busy)
     attach(start.input, do.move, [start, session], everything, trigger_mode="always_last", **busy)
+    attach(part.input, do.cut, [part, session], everything, trigger_mode="always_last", **busy)
+    pointed = attach(curve.pick, do.point, [session], everything, trigger_mode="always_last", **busy)
     again: dict[str, Any] = {**busy, "doing": AGAIN, "trigger_mode": "always_last"}
     for change in (scales.change, kind.change):
         change(None, [scales, kind], None, js=MARK_SCALES, api_visibility="private")
@@ -179,12 +209,13 @@ def room(services: Services) -> None:
     bind_closer(do.closer, views, ask, session, stage, {**again, "doing": LOOKING})
 
     arrival(door, do.arrive, [session], [*everything, views.wrong], room=NAME, **busy)
-    own = ("start", "scales", "selection", "code", "wrong")
+    own = ("start", "part", "scales", "selection", "code", "wrong")
     commits(NAME, {"motion": example}, example.input, forget=("caption", *own))
     commits(NAME, {"motion": upload}, upload.upload, forget=("caption", *own))
-    commits(NAME, {"caption": caption}, caption.submit, go.click, forget=own[1:])
+    commits(NAME, {"caption": caption}, caption.submit, go.click, forget=own[2:])
     commits(NAME, {"start": start}, start.input, forget=own[1:])
-    commits(NAME, {"system": system}, system.input, forget=own[1:])
+    commits(NAME, {"part": part}, part.input, pointed.then, forget=("start", *own[2:]))
+    commits(NAME, {"system": system}, system.input, forget=own[2:])
 
 
 def _controls(services: Services, opening: View) -> tuple[Any, ...]:
@@ -210,10 +241,7 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
         )  # fmt: skip
         ask = gr.Button("What do the words do?", size="sm", elem_id="tokenize-ask", elem_classes=["mtp-quiet"])
         go = gr.Button("Tokenize", variant="primary", size="sm", scale=0, min_width=84, elem_id="tokenize-go")
-    start = gr.Slider(
-        0, 1, value=0, step=0.1, visible=False, elem_id="tokenize-start",
-        label=control(NAME, "start").label,
-    )  # fmt: skip
+    window = _window()
     count = int(opening.controls.get("count", 1))
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):
         kind = gr.Radio(
@@ -224,4 +252,19 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
             1, max(count, 2), value=count, step=1, label=control(NAME, "scales").label, elem_id="tokenize-scales",
             scale=1, min_width=120,
         )  # fmt: skip
-    return example, system, upload, caption, go, ask, start, kind, scales
+    return example, system, upload, caption, go, ask, window, kind, scales
+
+
+def _window() -> tuple[Any, ...]:
+    """What is seen with a recording longer than a window: the box, the menu of parts, the slider, the speed curve."""
+    with gr.Column(visible=False, elem_classes=["mtp-cuts"], elem_id="tokenize-cuts", min_width=0) as box:
+        with gr.Row(elem_classes=["mtp-line"]):
+            part = gr.Dropdown(
+                [], value=None, label=control(NAME, "part").label, elem_id="tokenize-part", min_width=120, scale=1,
+            )  # fmt: skip
+            start = gr.Slider(
+                0, 1, value=0, step=0.1, label=control(NAME, "start").label, elem_id="tokenize-start", min_width=160,
+                scale=1,
+            )  # fmt: skip
+        curve = chart(None, label=LABEL, height=CURVE, elem_id="tokenize-curve", show_label=True)
+    return box, part, start, curve
