@@ -83,7 +83,7 @@ def _track(services: Services, one: Compared, first: Compared, several: bool) ->
     track = score(
         system, one.motion.frames, one.levels, services.palettes(system.name), sizes=sizes, marks=marks, marked=DIFFERS
     )
-    if several:
+    if several and one.setting.name != system.title:
         track["name"] = f"{track['name']}, {one.setting.name[:1].lower()}{one.setting.name[1:]}"
     return track
 
@@ -105,7 +105,8 @@ def compared_table(services: Services, done: Sequence[Compared], of: str, name: 
     for n, one in enumerate(done):
         cells = "".join(_cell(column, one, n in (best[k] or ())) for k, column in enumerate(columns))
         rows += f'<tr><th scope="row">{_name(one, n, n == take)}</th>{cells}</tr>'
-    told = measured_on(services, done[0].setting, of, name)
+    systems = list(dict.fromkeys(one.setting.system for one in done))
+    told = measured_on(services, done[0].setting, of, name, systems)
     return (
         '<div class="mtp-table-box"><table class="mtp-table mtp-compared"><thead><tr><th scope="col"></th>'
         f"{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
@@ -125,10 +126,9 @@ def best_of(done: Sequence[Compared], column: Column) -> set[int] | None:
     return None if len(found) == len(there) else found
 
 
-def measured_on(services: Services, setting: Setting, of: str, name: str) -> str:
+def measured_on(services: Services, setting: Setting, of: str, name: str, systems: Sequence[str]) -> str:
     """What the numbers of the table were measured on, in a line."""
-    checkpoint = services.checkpoint(setting.system)[:8]
-    system = f"{setting.system}, checkpoint {checkpoint}" if checkpoint else setting.system
+    system = "; ".join(_with_checkpoint(services, name) for name in systems)
     if of == MOTION:
         return f"This clip, {name}; {system}; time of tokenizing and decoding. Bold is best: the least."
     if of == EDIT:
@@ -137,6 +137,11 @@ def measured_on(services: Services, setting: Setting, of: str, name: str) -> str
         return f"{what}; {system}; time of tokenizing, drawing and decoding. Bold is best: the least."
     drawn = f"“{name}”, {setting.seconds:g} s, one motion each; {system}"
     return f"{drawn}; time of drawing and decoding. Bold is best: the least."
+
+
+def _with_checkpoint(services: Services, system: str) -> str:
+    checkpoint = services.checkpoint(system)[:8]
+    return f"{system}, checkpoint {checkpoint}" if checkpoint else system
 
 
 def _name(one: Compared, place: int, shown: bool) -> str:

@@ -16,7 +16,7 @@ from playground.systems import row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens
 from playground.ui.facts import bits
-from playground.ui.services import Services
+from playground.ui.services import SIDE_BY_SIDE, Services
 from playground.ui.state import State, control
 from playground.ui.uploads import checked_number
 
@@ -27,7 +27,6 @@ EDIT_TITLES = {  # kind of edit -> its name
     "inbetween": "In-between",
 }  # fmt: skip
 ALONE = "scales"  # what differs where there is one system only
-SHOWN = ("lgtok-lite", "momask", "mogo")  # systems side by side at first: three, so that the screen stays calm
 DRAWN = ("lgtok-lite", "momask", "t2mgpt-casim")  # from a prompt
 Choices = Callable[[Services], Sequence[tuple[str, str]]]
 
@@ -93,7 +92,7 @@ def _kinds(services: Services) -> list[tuple[str, str]]:
 
 _WORDS = {"own": "Its caption", "none": "No caption", "wrong": f"“{WRONG}”"}
 VARIATIONS: dict[str, Variation] = {
-    "system": Variation("Systems", MOTION, _systems(False), SHOWN, lambda s, v: replace(s, system=v)),
+    "system": Variation("Systems", MOTION, _systems(False), SIDE_BY_SIDE, lambda s, v: replace(s, system=v)),
     "scales": Variation(
         "Scales kept", MOTION, _scales, ("2", "5", "10"), lambda s, v: replace(s, scales=int(v)),
         "Scales 1 to {}"),

@@ -15,7 +15,8 @@ from playground.ui.comparing import (
 from playground.ui.drawing import MADE
 from playground.ui.editing import opening_motion
 from playground.ui.origins import is_clip, is_origin, origin_caption
-from playground.ui.rooms.embedding import first_clip
+from playground.ui.rooms.codebooks import shown_systems
+from playground.ui.rooms.embedding import first_clip, first_systems
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State, controls_of
 
@@ -57,7 +58,9 @@ def _nothing(services: Services, state: State) -> Any:
 
 
 def _system(services: Services, state: State) -> tuple[str, ...]:
-    return (services.default_system().name,)
+    if state.room == "codebooks":
+        return tuple(services.first_few(shown_systems(services)))
+    return tuple(first_systems(services)) if state.room == "embedding-map" else (services.default_system().name,)
 
 
 def _motion(services: Services, state: State) -> str:

@@ -95,7 +95,7 @@ def _choices(
     titles = {one.name: one.title for one in services.engine().systems()}
     several = len(systems) > 1
     system = gr.CheckboxGroup(
-        [(titles[name], name) for name in systems], value=[str(opening.controls.get("system"))] if systems else [],
+        [(titles[name], name) for name in systems], value=opening.controls.get("system", []),
         label="Systems side by side", elem_id="embedding-system", visible=several,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from playground.engine import Engine, Example, SystemInfo
 
 EngineSource = Callable[[], "Engine"]
+SIDE_BY_SIDE = ("lgtok-lite", "momask", "mogo")  # systems that rooms show first: three, so that a screen stays calm
 KIND_WORDS = {"synthetic": "synthetic", "generated": "generated here", "decoded clip": "recorded, kept as tokens"}
 
 
@@ -102,6 +103,10 @@ class Services:
         """The systems whose checkpoint is here; with a part ("tokenizer" or "generator") those that have it."""
         there = [system for system in self.engine().systems() if system.checkpoint == "shipped"]
         return [system for system in there if not part or getattr(system, part)]
+
+    def first_few(self, known: Sequence[str]) -> list[str]:
+        """Of the systems named those that a room shows side by side at first; the usual one where none of them is."""
+        return [name for name in SIDE_BY_SIDE if name in known] or [self.default_system().name]
 
     def preset(self, room: str, example: str) -> View | None:
         """The stored result of a room for an example, or None."""

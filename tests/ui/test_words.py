@@ -77,7 +77,7 @@ def test_the_next_motions_show_theirs_until_it_is_switched_off(do: Handlers, eng
     for seed in (3, 4):
         *_, last = do.generate(visit, PROMPT, False, 4.0, seed, *NUMBERS[2:])
         assert len(stage(last[0])["strips"]) == 1 and "map under the score" in last[-1]
-        assert last[-2]["value"] is True and last[-2]["visible"] is True
+        assert last[-2]["visible"] is True and "value" not in last[-2]  # who turns it meanwhile is not overruled
     back = do.bring_back(visit, SimpleNamespace(code="0"))  # type: ignore[arg-type]
     assert len(stage(back[0])["strips"]) == 1 and visit.looked is not None and visit.looked[0].seed == 3
 
@@ -95,7 +95,7 @@ def test_a_system_that_cannot_tell_has_no_switch(
     monkeypatch.setattr(FakeEngine, "looks_at_words", lambda self, system: system == DENOISER)
     last = made(do, Visit(words=True))
     assert stage(last[0])["strips"] == [] and last[-2]["visible"] is False and last[-1] == ""
-    assert do.settle(DENOISER, Visit())[-1]["visible"] is True
+    assert do.settle(DENOISER)[-1]["visible"] is True
     with gr.Blocks():
         assert words_switch(do.services)[0].visible is False
 
@@ -118,7 +118,7 @@ def test_a_system_without_tokens_draws_step_by_step(do: Handlers) -> None:
 
 def test_another_system_brings_its_own_sampling(do: Handlers, engine: FakeEngine) -> None:
     own = SYSTEMS[DENOISER].sampling
-    assert do.settle(DENOISER, Visit())[:5] == (own.guidance, own.cfg, own.temperature, own.top_k, own.top_p)
+    assert do.settle(DENOISER)[:5] == (own.guidance, own.cfg, own.temperature, own.top_k, own.top_p)
     state = parse(f"?room=generate&prompt=a+person+sits&system={DENOISER}&words=1&temperature=0.5")
     wish = Wish.checked(*wish_values(do.services, state))
     assert (wish.system, wish.cfg, wish.temperature) == (DENOISER, own.cfg, 0.5)

@@ -129,11 +129,12 @@ def code_view(services: Services, system: str, scale: int, code: int) -> View:
 
 def opening_view(services: Services) -> View:
     """All that the room shows at first: the usual system, and the code that its first scale uses most."""
-    first = services.default_system().name
-    wish = Wish((first,), "sorted", int(control(NAME, "k").default))
+    systems = services.first_few(shown_systems(services))
+    first = systems[0]
+    wish = Wish(tuple(systems), "sorted", int(control(NAME, "k").default))
     view = code_view(services, first, 1, int(services.bundle(first).usage.counts_[0].argmax()))
     charts = {"panels": panels(services, wish), "lines": lines(services, wish)}
-    told = {**view.controls, "table": scale_table(services, wish), "system": first}
+    told = {**view.controls, "table": scale_table(services, wish), "system": systems}
     return View(view.stage, facts(services, wish), charts, told, "stored", view.seconds)
 
 
@@ -176,7 +177,7 @@ class Handlers:
         """What a link asks for; what is not stored here gives way to what the room opens with."""
         state = asked(event)
         known = shown_systems(self.services)
-        systems = [name for name in state["system"] or () if name in known] or [self.services.default_system().name]
+        systems = [name for name in state["system"] or () if name in known] or self.services.first_few(known)
         drawn = self.draw(systems, state["order"], state["k"])
         try:
             shown = self.show(state["code"] or self.opening.controls.get("code"))
@@ -227,7 +228,7 @@ def _controls(services: Services, opening: View) -> tuple[gr.CheckboxGroup, gr.R
     names = shown_systems(services)
     row = control(NAME, "k")
     system = gr.CheckboxGroup(
-        [(row_of(name).title, name) for name in names], value=[str(opening.controls.get("system"))] if names else [],
+        [(row_of(name).title, name) for name in names], value=opening.controls.get("system", []),
         label="Systems", elem_id="codebooks-system", visible=len(names) > 1,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):

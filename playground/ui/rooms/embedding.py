@@ -58,6 +58,11 @@ def first_clip(bundle: Bundle) -> int:
     return int(rows[np.square(bundle.means[rows] - middle).sum(axis=1).argmin()])
 
 
+def first_systems(services: Services) -> list[str]:
+    """Whose maps the room shows at first: two side by side, where two are stored."""
+    return services.first_few(map_systems(services))[:2]
+
+
 def neighbours(bundle: Bundle, row: int, count: int = NEIGHBOURS) -> list[int]:
     """Rows of the `count` clips nearest to a clip in all dimensions, nearest first."""
     distance = np.square(bundle.means - bundle.means[row]).sum(axis=1)
@@ -93,11 +98,11 @@ def show(services: Services, systems: Sequence[str], wanted: str) -> View:
 
 def opening_view(services: Services) -> View:
     """The room's first result, maps included."""
-    first = services.default_system().name
-    bundle = services.bundle(first)
-    view = show(services, [first], bundle.clips[first_clip(bundle)].id)
-    view.charts["maps"] = maps([bundle], Shown((first,)), view.controls["id"])
-    view.controls.update(about=about(bundle), system=first)
+    systems = first_systems(services)
+    bundles = [services.bundle(name) for name in systems]
+    view = show(services, systems, bundles[0].clips[first_clip(bundles[0])].id)
+    view.charts["maps"] = maps(bundles, Shown(tuple(systems)), view.controls["id"])
+    view.controls.update(about=about(bundles[0]), system=systems)
     return view
 
 
@@ -189,7 +194,7 @@ class Handlers:
         """What a link asks for."""
         state = asked(event)
         systems = [name for name in state["system"] or () if name in map_systems(self.services)]
-        systems = systems or [self.services.default_system().name]
+        systems = systems or first_systems(self.services)
         bundle, wanted = self.services.bundle(systems[0]), state["motion"]
         wanted = wanted if wanted in bundle.ids else bundle.clips[first_clip(bundle)].id
         drawn = self.draw(systems, state["each"], state["colour"], state["map"], wanted, held)

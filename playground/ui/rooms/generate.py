@@ -89,11 +89,11 @@ class Handlers:
         visit.wanted, visit.take = read_changes(state["changes"]), int(state["take"])
         visit.words = bool(state["words"])
         values = wish_values(self.services, state)
-        return *values, self._switch(visit.words, str(values[-1]))
+        return *values, self._switch(str(values[-1]), value=visit.words)
 
-    def settle(self, system: str, visit: Visit) -> tuple[Any, ...]:
+    def settle(self, system: str) -> tuple[Any, ...]:
         """Another system in the menu: its own sampling, and the switch of the words where it has one."""
-        return *astuple(self.services.sampling(system)), self._switch(visit.words, system)
+        return *astuple(self.services.sampling(system)), self._switch(system)
 
     def begin(self, visit: Visit) -> tuple[Any, ...]:
         """At the click, before any waiting: "Stop" becomes possible and "Generate" does not."""
@@ -188,7 +188,7 @@ class Handlers:
         stage = Noted(with_words(view, looked).stage_json(), f"{told[:1].upper()}{told[1:]}." if told else "")
         links = onward(result, visit.take, self.services.system().name)
         told_of = (links, earlier(visit), which, write_changes(result.changes), card)
-        seen = (self._switch(visit.words, made.system), words_card(looked, why))
+        seen = (self._switch(made.system), words_card(looked, why))
         return stage, view.facts_html(), *told_of, *(result.address[key] for key in WISHES), *seen
 
     def _looked(self, visit: Visit, made: "Generation") -> tuple["Alignment | None", str]:
@@ -203,8 +203,9 @@ class Handlers:
                 return None, str(error)
         return visit.looked[1], ""
 
-    def _switch(self, on: bool, system: str) -> Any:
-        return gr.update(value=on, visible=self.services.engine().looks_at_words(system))
+    def _switch(self, system: str, **value: bool) -> Any:
+        """The switch of the words, for a system that has something to tell; its visitor alone turns it, or a link."""
+        return gr.update(visible=self.services.engine().looks_at_words(system), **value)
 
     def _card(self, visit: Visit, result: Result) -> str:
         assert visit.token is not None
@@ -251,7 +252,7 @@ def room(services: Services) -> None:
     do = Handlers(services)
     _wire(do, visit, message, shown, buttons, door)
     quick: dict[str, Any] = {"model": False, "trigger_mode": "always_last"}
-    attach(system.input, do.settle, [system, visit], [*numbers, switch], message, **quick)
+    attach(system.input, do.settle, [system], [*numbers, switch], message, **quick)
     seen: dict[str, Any] = {"stage": NAME, "doing": LOOKING, "trigger_mode": "always_last"}
     shown_words = attach(switch.input, do.look, [switch, visit], [stage, looked], message, **seen)
     shown_words.then(None, [switch], None, js=REVEAL, api_visibility="private")
