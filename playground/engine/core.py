@@ -124,6 +124,11 @@ class Engine(BaseEngine):
         text = normalise(result.caption if caption is None else caption, what="caption", allow_empty=True)
         return language.words_by_frames(self._with_tokens(result), result, text)
 
+    def reads_words(self, system: str) -> bool:
+        """Whether a system's detokenizer reads the caption, which is where guidance acts; loads no weight."""
+        reads = row_of(system).tokenizer is not None and self._config(system).get("text_side")
+        return reads in ("both", "detokenizer")
+
     def looks_at_words(self, system: str) -> bool:
         """Whether `alignment` has something to tell of a system's motions; loads no weight."""
         return alignment.can_look(self.assets, row_of(system))

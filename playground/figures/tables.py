@@ -44,6 +44,12 @@ class Table:
         caption = "".join(f"<p><small>{escape(line)}</small></p>" for line in self.caption.splitlines())
         return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{caption}"
 
+    @property
+    def markdown(self) -> str:
+        """The same as a Markdown table, without title and caption."""
+        lines = [self.columns, ("---",) * len(self.columns), *self.rows]
+        return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
     def __str__(self) -> str:
         lines = [self.title, " | ".join(self.columns), *(" | ".join(row) for row in self.rows), self.caption]
         return "\n".join(line for line in lines if line)

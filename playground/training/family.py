@@ -25,7 +25,7 @@ SIZES = ("cpu", "gpu")
 _CPU_TOKENIZER = TokenizerTraining(
     model=replace(PRESETS["lite"], scales=FULL_SCALES, width=96, heads=2, hidden=320, code_width=96),
     batch=BatchConfig(size=32, speed=0.3, source_balance=0.5, action_balance=0.3),
-    schedule=Schedule(steps=2_400, rate=1.2e-3),
+    schedule=Schedule(steps=1_800, rate=1.2e-3),
     heading=0.02,
     masked_mean=True,
 )
@@ -33,7 +33,7 @@ _CPU_GENERATOR = GeneratorTraining(  # 1.6 M
     model=replace(GENERATOR_PRESETS["lite"], width=128, depth=5, heads=2, hidden=256),
     tokenizer="lgtok-tokenizer",
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=3_000, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=1_200, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
     keep=0.8,
 )
 # 13.2 M and 6.4 M: 39 MB together, close to the largest that a flagship may have.
@@ -48,7 +48,7 @@ _GPU_TOKENIZER = replace(
 _GPU_GENERATOR = replace(
     _CPU_GENERATOR,
     model=replace(GENERATOR_PRESETS["lite"], dropout=0.1),
-    schedule=replace(_CPU_GENERATOR.schedule, rate=8e-4, save_every=1_000, validate_every=1_000),
+    schedule=replace(_CPU_GENERATOR.schedule, steps=4_000, rate=8e-4, save_every=1_000, validate_every=1_000),
     size=128,
     variants=10,
 )

@@ -30,12 +30,12 @@ _GENERATOR = GeneratorTraining(
     model=MASKED_PRESETS["lite"],
     tokenizer="momask-tokenizer",
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=3_000, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=2_000, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
 )
 _DIFFUSION = FeatureTraining(
     model=DIFFUSION_PRESETS["lite"],
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=2_500, rate=1e-3, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=1_800, rate=1e-3, clip=1.0, fall=0.35),
 )
 
 TOKENIZERS: dict[str, TokenizerTraining] = {
@@ -49,7 +49,7 @@ _SCALES, _GPT = MASKED_SCALES_PRESETS["lite"], GPT_PRESETS["lite"]
 GENERATORS: dict[str, GeneratorTraining] = {
     "mosa-generator": replace(
         _GENERATOR, model=replace(GENERATOR_PRESETS["lite"], width=128, depth=5, heads=2, hidden=256), keep=0.8,
-        tokenizer="mosa-tokenizer",
+        tokenizer="mosa-tokenizer", schedule=replace(_GENERATOR.schedule, steps=1_200),  # 236 tokens a motion: slow
     ),
     "momask-generator": _GENERATOR,
     "momask-lgtok-generator": replace(_GENERATOR, tokenizer="lgtok-rvq-tokenizer", lent=True),

@@ -40,7 +40,13 @@ def _guidance(services: Services, state: State) -> Values:
     """The motion with its words at the slider's g and at the usual ones, where g is one of those that are listed."""
     g = repr(float(state["g"])).removesuffix(".0")
     values = _listed(services, "g", sorted({*VARIATIONS["g"].usual, g}, key=float))
-    return {"vary": "g", "values": values, "motion": state["motion"], "caption": state["caption"]}
+    return {
+        "vary": "g",
+        "values": values,
+        "motion": state["motion"],
+        "caption": state["caption"],
+        **_own(services, state),
+    }
 
 
 def _generate(services: Services, state: State) -> Values:
@@ -49,14 +55,15 @@ def _generate(services: Services, state: State) -> Values:
     several = state["takes"] > 1 and seeds is not None
     words = {} if state["free"] else {"prompt": state["prompt"]}
     numbers = {"seconds": state["seconds"], "seed": state["seed"]}
-    return {"vary": "seed" if several else "s", "values": seeds if several else None, **words, **numbers}
+    vary = {"vary": "seed" if several else "s", "values": seeds if several else None}
+    return vary | words | numbers | _own(services, state)
 
 
 def _edit(services: Services, state: State) -> Values:
     """The same edit of the same motion, drawn with other seeds."""
     values = _listed(services, "redraw", [str(state["seed"] + n) for n in range(3)])
     keys = ("motion", "caption", "prompt", "kind", "from", "to", "seed")
-    return {"vary": "redraw", "values": values, **{key: state.values.get(key) for key in keys}}
+    return {"vary": "redraw", "values": values, **{key: state.values.get(key) for key in keys}, **_own(services, state)}
 
 
 def _endless(services: Services, state: State) -> Values:
@@ -74,6 +81,11 @@ def _embedding_map(services: Services, state: State) -> Values:
     placed = str(state["place"] or "")
     own = placed if placed and not placed.startswith(OWN_FILE) else state["motion"]
     return {"vary": first_variation(services), "motion": own}
+
+
+def _own(services: Services, state: State) -> Values:
+    """The system of the room, where it is not the one that the page prefers anyway."""
+    return {} if state.system == services.default_system().name else {"system": (state.system,)}
 
 
 def _listed(services: Services, vary: str, values: Sequence[str]) -> str | None:

@@ -37,6 +37,7 @@ class Closer:
         if not chosen:
             yield self.close(replace(held, token=None))
             return
+        self._check_whose(held, chosen)
         level, position = self._place(held, chosen)
         if held.token == (level, position) and held.found.swap is not None:
             yield self._told(held)
@@ -61,6 +62,15 @@ class Closer:
         else:
             self._swap(held, self._code(held, str(event.do), str(event.code), str(event.number)))
         return self._told(held)
+
+    def _check_whose(self, held: Session, chosen: Any) -> None:
+        """PlaygroundError for a token of a system that stands beside the first one."""
+        first = system_of(self.services, held)
+        if chosen.get("system", first.name) in held.beside:
+            whose = self.services.system(str(chosen["system"])).title
+            raise PlaygroundError(
+                f"this is a token of {whose}; only the first system's tokens are taken apart: choose {whose} first"
+            )
 
     def _place(self, held: Session, chosen: Any) -> tuple[int, int]:
         try:

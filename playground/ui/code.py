@@ -13,7 +13,7 @@ from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.ui.codelines import TOKENS, changed, drawn, in_words, literal, number, opened, remade, scale_set
 from playground.ui.comparing import EDIT, PROMPT, VARIATIONS, Setting
-from playground.ui.drawing import MADE, read_changes
+from playground.ui.drawing import MADE, read_changes, read_name
 from playground.ui.placing import SECONDS, SEED
 from playground.ui.state import OWN_FILE, State, Token
 from playground.ui.walking import PIECE, SYSTEM, read_plan
@@ -49,7 +49,22 @@ def _tokenize(state: State) -> tuple[str, str]:
         + f"back = engine.reconstruct(tokens{asked})\n"
         + TOKENS.format(name="tokens")
         + f'print(f"MPJPE, {words}: {{back.mpjpe_mm:.1f}} mm")\n'
+        + _beside(state)
         + _closer(state)
+    )
+
+
+def _beside(state: State) -> str:
+    """The other systems that stand beside the first one, all their scales."""
+    others = tuple(state.values.get("system") or ())[1:]
+    if not others:
+        return ""
+    return (
+        f"\n# The same motion through other systems.\nothers = {{}}\nfor name in {list(others)!r}:\n"
+        f"    others[name] = engine.tokenize(motion, {literal(state['caption'])}, system=name)\n"
+        "    other = engine.reconstruct(others[name])\n"
+        "    count = sum(level.size for level in others[name].levels)\n"
+        '    print(f"{name}: {count} tokens, MPJPE {other.mpjpe_mm:.1f} mm")\n'
     )
 
 
@@ -173,15 +188,19 @@ def _edit(state: State) -> tuple[str, str]:
     edges = [state["from"], state["to"]]
     known = None not in edges
     span = f"({', '.join(str(round(float(edge) * LIMITS.fps)) for edge in edges)})" if known else "None"
-    made = str(state["motion"]).startswith(MADE)
-    if not made:
+    made, source = str(state["motion"]).startswith(MADE), "motion"
+    own = made and read_name(str(state["motion"]), str(state["caption"]))[0].system in ("", state.system)
+    if own:
+        source = "made"
+    else:
+        source = "made.motion" if made else source
         given |= {"system": literal(state.system), "caption": literal(state["caption"])}
     given |= {"anchor": literal(state["anchor"]), "measured": str(bool(state["measured"]))}
     given |= {"guidance": number(state["g"]), "cfg": number(state["s"])}
     arguments = "".join(f"    {name}={value},\n" for name, value in given.items())
     return "A span of a motion drawn anew; the frames outside stay as they were.", (
         (remade(state) if made else opened(state))
-        + f"edited = engine.edit(\n    {'made' if made else 'motion'},\n    {span},\n{arguments})\n"
+        + f"edited = engine.edit(\n    {source},\n    {span},\n{arguments})\n"
         + TOKENS.format(name="edited")
         + "assert (edited.motion.joints[edited.kept] == edited.source.joints[edited.kept]).all()\n"
         + "for seam in edited.seams:\n"

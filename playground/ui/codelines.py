@@ -41,7 +41,7 @@ def remade(state: State) -> str:
     wish, changes = read_name(str(state["motion"]), str(state["caption"]))
     own = {"prompt": wish.prompt or "", "free": wish.prompt is None, "seconds": wish.seconds, "g": wish.guidance,
            "s": wish.cfg, "temperature": wish.temperature, "topk": wish.top_k, "topp": wish.top_p,
-           "system": (state.system,)}  # fmt: skip
+           "system": (wish.system or state.system,)}  # fmt: skip
     return (
         "from playground.engine import default_engine\n\nengine = default_engine()\n"
         + drawn(State("generate", own), wish.seed, 1)

@@ -12,7 +12,7 @@ from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.measures import foot_sliding, mpjpe
 from playground.motion.motion import Motion
-from playground.systems import row_of
+from playground.systems import SystemInfo, row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens
 from playground.ui.facts import bits
@@ -154,13 +154,13 @@ def first_variation(services: Services) -> str:
 
 def settings_of(
     services: Services, vary: str, values: Sequence[str], text: str, seconds: object = 4.0, seed: object = 0,
-    kind: str = "inpaint", span: tuple[float, float] | None = None,
+    kind: str = "inpaint", span: tuple[float, float] | None = None, system: str | None = None,
 ) -> list[Setting]:  # fmt: skip
-    """The settings side by side. text: the prompt, or the caption of the motion; kind and span (seconds): of an edit.
-    PlaygroundError for a wrong number."""
+    """The settings side by side. text: the prompt, or the caption of the motion; kind and span (seconds): of an edit;
+    system: of all of them, where it can do that. PlaygroundError for a wrong number."""
     if vary not in VARIATIONS:
         raise PlaygroundError(f"what differs is one of {', '.join(VARIATIONS)}")
-    variation, system = VARIATIONS[vary], services.default_system()
+    variation, usual = VARIATIONS[vary], services.default_system()
     known = {name for _, name in variation.choices(services)}
     picked = [value for value in values if value in known]
     if not 2 <= len(picked) <= variation.most:
@@ -168,14 +168,22 @@ def settings_of(
     words = text if variation.of == MOTION else normalise(text)
     long = checked_number(seconds, "the length in seconds", LIMITS.min_seconds, LIMITS.max_seconds)
     number = int(checked_number(seed, "the seed", 0, LIMITS.max_seed))
-    own = system.sampling
-    base = Setting("", system.name, words, long, number, own.cfg, own.temperature, own.guidance)
+    whole = next((one for one in _able(services, vary) if one.name == system), usual)
+    own = whole.sampling
+    base = Setting("", whole.name, words, long, number, own.cfg, own.temperature, own.guidance)
     base = replace(base, guidance=0.0) if variation.of == MOTION else base
     base = replace(base, kind=kind, span=span) if variation.of == EDIT else base
     return [
         variation.apply(replace(base, name=variation.called.format(title)), name)
         for title, name in chosen(services, vary, picked)
     ]
+
+
+def _able(services: Services, vary: str) -> list[SystemInfo]:
+    """The systems that such a comparison can be made with; none but the usual one where its scales are chosen from."""
+    if VARIATIONS[vary].of == MOTION:
+        return services.readers() if vary == "g" else []
+    return services.editors() if VARIATIONS[vary].of == EDIT else services.shipped("generator")
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,17 +13,19 @@ from playground.ui.comparing import (
     variation_of,
 )
 from playground.ui.drawing import MADE
-from playground.ui.editing import opening_motion
+from playground.ui.editing import editor_of, opening_motion
 from playground.ui.origins import is_clip, is_origin, origin_caption
 from playground.ui.rooms.codebooks import shown_systems
 from playground.ui.rooms.embedding import first_clip, first_systems
+from playground.ui.rooms.guidance import reader_of
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State, controls_of
 
 
 def complete(services: Services, state: State) -> State:
     """The state with every control of its room given. PlaygroundError where nothing is shipped to fill it with."""
-    filled = state
+    shown = SHOWN.get(state.room)
+    filled = state.with_values(system=(shown(services, state.system)[0],)) if shown else state
     for row in controls_of(state.room):
         if filled.values.get(row.key) is None or (row.key == "motion" and not _is_there(services, filled)):
             value = row.default if row.default is not None else FILLS.get(row.key, _nothing)(services, filled)
@@ -38,9 +40,9 @@ def _with_settings(services: Services, state: State) -> State:
     picked = [name for _, name in chosen(services, vary, str(state.values.get("values") or "").split("_"))]
     text = str(state["caption"] if VARIATIONS[vary].of == MOTION else state["prompt"])
     picked, numbers = picked[: VARIATIONS[vary].most], (state["seconds"], state["seed"])
-    edit = (str(state["kind"]), span_of(state))
-    settings = settings_of(services, vary, picked, text, *numbers, *edit)
-    return state.with_values(settings=settings, clip=is_clip(services, str(state["motion"])))
+    edit, usual = (str(state["kind"]), span_of(state)), services.default_system().name
+    settings = settings_of(services, vary, picked, text, *numbers, *edit, state.system)
+    return state.with_values(settings=settings, clip=is_clip(services, str(state["motion"])), system=(usual,))
 
 
 def _is_there(services: Services, state: State) -> bool:
@@ -85,6 +87,8 @@ def _sampling(name: str) -> Callable[[Services, State], float]:
     return fill
 
 
+# Room -> which system it shows where one is asked for, not every one being able to.
+SHOWN: dict[str, Callable[[Services, str | None], tuple[str, str]]] = {"edit": editor_of, "guidance": reader_of}
 # Key -> what stands there when the address does not say; in the order of the table, so `motion` knows the system.
 FILLS: dict[str, Callable[[Services, State], Any]] = {
     "system": _system,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.results import Generation, GenerationStep
-from playground.systems import SamplingDefaults
+from playground.systems import SYSTEMS, SamplingDefaults
 from playground.text.prompts import normalise
 from playground.ui.services import Services
 from playground.ui.state import State
@@ -242,13 +242,12 @@ def wish_values(services: Services, state: State) -> tuple[Any, ...]:
 
 
 def made_name(wish: Wish, seed: int, changes: Sequence[Change] = ()) -> str:
-    """A generated motion as the value of `motion` in an address: all that it takes to draw it again but its prompt.
-
-    "" where that is more than an address has room for.
+    """A generated motion as the value of `motion` in an address: all that it takes to draw it again but its prompt; the
+    system only where the wish names it. "" where that is more than an address has room for.
     """
     numbers = (wish.seconds, wish.guidance, wish.cfg, wish.temperature, wish.top_k, wish.top_p)
     parts = [str(seed), *(repr(round(float(number), 3)).removesuffix(".0") for number in numbers)]
-    name = MADE + "_".join([*parts, *map(str, changes)])
+    name = MADE + "_".join([*parts, *filter(None, [wish.system]), *map(str, changes)])
     return name if len(name) <= MAX_NAME else ""
 
 
@@ -257,18 +256,19 @@ def read_name(name: str, prompt: str) -> tuple[Wish, tuple[Change, ...]]:
     parts = name.removeprefix(MADE).split("_")
     try:
         seed, numbers = int(parts[0]), [float(part) for part in parts[1:7]]
+        system = parts.pop(7) if len(parts) > 7 and parts[7] in SYSTEMS else ""
         changes = read_changes("_".join(parts[7:])) if parts[7:] else ()
         if not name.startswith(MADE) or len(numbers) != 6 or len(changes) != len(parts[7:]):
             raise ValueError(name)
     except ValueError:
         raise PlaygroundError("this link names no motion that can be drawn again; choose another one") from None
-    return Wish.checked(prompt, not prompt, numbers[0], seed, *numbers[1:]), changes
+    return replace(Wish.checked(prompt, not prompt, numbers[0], seed, *numbers[1:]), system=system), changes
 
 
-def made_again(services: Services, name: str, prompt: str) -> Generation:
-    """The motion that `made_name` names. PlaygroundError for any other name."""
+def made_again(services: Services, name: str, prompt: str, usual: str = "") -> Generation:
+    """The motion that `made_name` names, by the system `usual` where it names none. PlaygroundError for other names."""
     wish, changes = read_name(name, prompt)
-    result = last_of(draw(services, wish))
+    result = last_of(draw(services, replace(wish, system=wish.system or usual)))
     for wanted in changes:
         result = last_of(change(services, result, 0, wanted))
     return result.takes[0]

@@ -10,6 +10,7 @@ from playground.figures.stage import Json
 from playground.limits import LIMITS
 from playground.motion.motion import Motion
 from playground.results import Generation, Tokenized
+from playground.systems import row_of
 from playground.ui.comparing import EDIT_TITLES
 from playground.ui.drawing import MADE, made_again
 from playground.ui.facts import Fact, significant, table
@@ -85,6 +86,15 @@ class EditSession:
     base: Tokenized | Generation | None = None
     upload: Source | None = None
     start: float = 0.0  # second at which the window of a long file begins
+    system: str = ""  # that edits; "" for the one the page prefers
+
+
+def editor_of(services: Services, wanted: str | None) -> tuple[str, str]:
+    """The system that edits where this one is wanted, and a sentence where it is another one."""
+    usual = services.system()
+    if wanted is None or wanted in [one.name for one in services.editors()]:
+        return wanted or usual.name, ""
+    return usual.name, f"{row_of(wanted).title} cannot edit here; this is {usual.title}."
 
 
 def opening_motion(services: Services) -> str:
@@ -98,9 +108,12 @@ def open_source(
     """A motion of the library, the visitor's own file or a generated motion, tokenized. caption None: its own; start:
     second of a long file at which the window begins."""
     held = replace(held, start=start if name.startswith(OWN_FILE) else 0.0)
+    system = services.system(held.system).name
     if name.startswith(MADE):
-        made = made_again(services, name, caption or "")
-        return replace(held, name=name, title=made.prompt or "A generated motion", caption=made.prompt, base=made)
+        made = made_again(services, name, caption or "", system)
+        own = made.system == system  # another system's motion is read as tokens first, as any other motion is
+        base = made if own else services.engine().tokenize(made.motion, made.prompt, system=system)
+        return replace(held, name=name, title=made.prompt or "A generated motion", caption=made.prompt, base=base)
     if name.startswith(OWN_FILE):
         if held.upload is None:
             raise PlaygroundError(
@@ -111,18 +124,19 @@ def open_source(
         found = services.example(name)
         motion, title, own = found.motion(), found.title, found.caption
     text = own if caption is None else caption
-    base = services.engine().tokenize(motion, text, system=services.default_system().name)
-    return replace(held, name=name, title=title, caption=base.caption, base=base)
+    read = services.engine().tokenize(motion, text, system=system)
+    return replace(held, name=name, title=title, caption=read.caption, base=read)
 
 
 def source_view(services: Services, session: EditSession) -> View:
     """The motion before anything is done to it."""
     began = time.perf_counter()
     base = _base(session)
-    system = services.default_system()
+    system = services.system(session.system)
     figure = scene.figure(BEFORE, "Before", base.motion.joints, None, session.title)
     track = score(system, base.motion.frames, base.levels, services.palettes(system.name))
-    stage = scene.payload([figure], [track], scene=f"source {session.name} {session.start:g} {base.motion.frames}")
+    shown = f"source {session.name} {session.start:g} {base.motion.frames} {system.name}"
+    stage = scene.payload([figure], [track], scene=shown)
     return View(stage=stage, seconds=max(base.seconds, time.perf_counter() - began))
 
 
@@ -145,7 +159,7 @@ def run(services: Services, session: EditSession, wish: EditWish) -> View:
 
 def edited_scene(services: Services, session: EditSession, edited: "Edited") -> Json:
     """Both motions on one clock, with the score of the new one; tokens that were drawn anew are marked."""
-    system = services.default_system()
+    system = services.system(session.system)
     figures = [
         scene.figure(BEFORE, "Before", edited.source.joints, None, session.title),
         scene.figure(AFTER, "After", edited.motion.joints, edited.system, f"“{edited.prompt}”", ghost_of=BEFORE),
@@ -154,7 +168,7 @@ def edited_scene(services: Services, session: EditSession, edited: "Edited") -> 
         system, edited.motion.frames, edited.levels, services.palettes(system.name), marks=edited.redrawn,
         marked="drawn anew",
     )  # fmt: skip
-    shown = f"edited {session.name} {edited.span} {edited.kind}"
+    shown = f"edited {session.name} {edited.span} {edited.kind} {system.name}"
     return scene.payload(figures, [track], hatch=scene.spans_of(edited.kept), scene=shown)
 
 

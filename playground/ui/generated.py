@@ -45,11 +45,12 @@ def words_card(looked: "Alignment | None", why: str = "") -> str:
     )
 
 
-def with_words(view: View, looked: "Alignment | None") -> View:
-    """The same result with the map of words by frames under its score, where there is one."""
+def with_words(view: View, looked: "Alignment | None", result: Result, take: int) -> View:
+    """The same result with the map of words by frames under its score, where there is one: that of one motion."""
     if looked is None:
         return view
-    strip = words_strip(f"Which words {_kind(looked)[0]}", looked.words, looked.weights)
+    whose = f", seed {result.takes[take].seed}" if len(result.takes) > 1 else ""
+    strip = words_strip(f"Which words {_kind(looked)[0]}{whose}", looked.words, looked.weights)
     return replace(view, stage={**view.stage, "strips": [strip]})
 
 
@@ -83,7 +84,7 @@ def _view(
     figures = [scene.figure(BEFORE, "Before", before.motion.joints, system.name)] if before else []
     ghost = BEFORE if before else None
     for n, (one, name) in enumerate(zip(made, names, strict=True)):
-        told = growing or ("tokens below" if several and n == take else "")
+        told = growing or ("tokens below" if sizes and several and n == take else "")
         id = f"made{n or ''}"
         figures.append(scene.figure(id, name, one.motion.joints, system.name, told, ghost_of=ghost))
     marks = [new.ids != old.ids for new, old in zip(shown.levels, before.levels, strict=False)] if before else None
@@ -120,14 +121,17 @@ def earlier(visit: Visit) -> str:
     return shelf("This visit", entries[::-1])
 
 
-def onward(result: Result, take: int, usual: str = "") -> str:
-    """Where this motion can be taken next: links that the page follows without leaving. usual: the system that Edit
-    works with, "" for that of the motion."""
-    wish, made = result.wish, result.takes[take]
+def onward(result: Result, take: int, editors: Sequence[str] = ()) -> str:
+    """Where this motion can be taken next: links that the page follows without leaving. editors: systems that can edit,
+    first the one that Edit opens with; another one of them edits its own motions."""
+    made = result.takes[take]
+    wish = replace(result.wish, system=made.system)
     seed = wish.seed if result.changes else made.seed
     links, name = [], made_name(wish, seed, result.changes)
-    if name and usual in ("", made.system):
-        links.append(("Edit this motion", State("edit", {"motion": name, "caption": wish.prompt or ""})))
+    if name:
+        own = {"system": (made.system,)} if made.system in editors[1:] else {}
+        state = State("edit", {"motion": name, "caption": wish.prompt or "", **own})
+        links.append(("Edit this motion", state))
     parts = [f'<a data-state href="{html.escape(query(state), quote=True)}">{text}</a>' for text, state in links]
     return f'<p class="mtp-aside mtp-onward">{" · ".join(parts)}</p>'
 

@@ -207,7 +207,7 @@ def mean_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> fl
 
 def _note(bundle: Bundle, row: int, scale: int, position: int) -> str:
     clip = bundle.clips[row]
-    token = f"scale {scale}, token {position + 1} of {bundle.sizes[scale - 1]}, in: " if scale else ""
+    token = f"scale {scale}, token {position + 1} of {bundle.count(row, scale - 1)}, in: " if scale else ""
     return f"{clip.action}<br>{token}{sentence(bundle, row)}, {clip.frames / LIMITS.fps:.1f} s"
 
 

@@ -104,6 +104,14 @@ class Services:
         there = [system for system in self.engine().systems() if system.checkpoint == "shipped"]
         return [system for system in there if not part or getattr(system, part)]
 
+    def editors(self) -> list["SystemInfo"]:
+        """The shipped systems that can draw a part of a motion anew: those with tokens and a generator of them."""
+        return [system for system in self.shipped("tokenizer") if system.generator]
+
+    def readers(self) -> list["SystemInfo"]:
+        """The shipped systems whose decoder reads words, which is where the guidance g acts."""
+        return [system for system in self.shipped("tokenizer") if self.engine().reads_words(system.name)]
+
     def first_few(self, known: Sequence[str]) -> list[str]:
         """Of the systems named those that a room shows side by side at first; the usual one where none of them is."""
         return [name for name in SIDE_BY_SIDE if name in known] or [self.default_system().name]

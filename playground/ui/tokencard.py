@@ -65,7 +65,7 @@ def occurrences(bundle: "Bundle | None", scale: int, code: int) -> str:
         return '<p class="mtp-aside">There is no stored analysis of this system, so nothing is counted.</p>'
     places = bundle.where_used(scale - 1, code)
     rows = dict.fromkeys(row for row, _ in places)
-    total = len(bundle) * bundle.sizes[scale - 1]
+    total = int(bundle.usage.totals_[scale - 1])
     first = dict(reversed(places))  # row -> its first position
     counted = (
         f"In {len(rows)} of {len(bundle)} {bundle.split} clips of {bundle.data}; {len(places)} of {total:,} tokens of "
@@ -101,7 +101,7 @@ def sentence(bundle: "Bundle", row: int) -> str:
 
 def _place(bundle: "Bundle", row: int, scale: int, position: int) -> str:
     clip = bundle.clips[row]
-    step = clip.frames / bundle.sizes[scale - 1] / LIMITS.fps
+    step = clip.frames / bundle.count(row, scale - 1) / LIMITS.fps
     when = f"{position * step:.1f} to {(position + 1) * step:.1f} s"
     words = {"room": "embedding-map", "system": bundle.system, "motion": clip.id}
     query = urlencode({**words, "selection": f"{bundle.system}.{scale}.{position}"})

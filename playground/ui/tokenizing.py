@@ -13,6 +13,7 @@ from playground.figures import stage as scene
 from playground.figures.stage import ORIGINAL_ID, Json
 from playground.findings import ScaleSet
 from playground.motion.motion import Motion
+from playground.ui.beside import Companion, companion
 from playground.ui.cutting import part_of
 from playground.ui.energy import energy_bars
 from playground.ui.facts import Fact, millimetres
@@ -37,6 +38,7 @@ class Findings:
 
     studies: dict[str, "ScaleStudy"] = field(default_factory=dict)  # kind of scale set -> all of that kind, decoded
     spans: dict[int, NDArray[np.int64]] = field(default_factory=dict)  # scale -> measured spans [s, 2]
+    beside: dict[str, Companion] = field(default_factory=dict)  # system -> what it makes of the same motion
     swap: "Swap | None" = None
     language: "Language | None" = None
     attention: "Attention | None" = None
@@ -54,7 +56,8 @@ class Session:
     caption: str = ""
     tokenized: "Tokenized | None" = None
     upload: Source | None = None  # stays in the menu when an example is chosen
-    system: str = ""  # "" for the one the page prefers
+    system: str = ""  # whose tokens are taken apart; "" for the one the page prefers
+    beside: tuple[str, ...] = ()  # systems shown beside it
     scales: ScaleSet | None = None  # of the decode on the stage; None for all
     token: tuple[int, int] | None = None  # selected: scale from 1, position from 0
     wish: int | None = None  # code that a link wants the selected token to be replaced by
@@ -171,7 +174,20 @@ def stage_of(services: Services, held: Session) -> Json:
     decodes = study(services, held, used.kind)
     error = f"MPJPE {millimetres(float(decodes.mpjpe_mm[used.scale - 1]))}"
     rebuilt = _rebuilt(system, decodes.motions[used.scale - 1], error)
-    return _scene(held, [_original(tokenized), rebuilt], _track(services, held, tokenized.levels))
+    if held.beside:  # with others beside it, its name says more than where it comes from
+        rebuilt = {**rebuilt, "name": system.title, "caption": error}
+    figures = [_original(tokenized), rebuilt, *(one.figure() for one in companions(services, held))]
+    return _scene(services, held, figures, _track(services, held, tokenized.levels))
+
+
+def companions(services: Services, held: Session) -> list[Companion]:
+    """The systems beside the first one, each with its tokens of the motion; made once."""
+    assert held.tokenized is not None
+    made, first = held.found.beside, system_of(services, held).name
+    for name in held.beside:
+        if name != first and name not in made:
+            made[name] = companion(services, held.tokenized, name)
+    return [made[name] for name in held.beside if name in made]
 
 
 def _swapped_scene(services: Services, held: Session, swap: "Swap") -> Json:
@@ -186,7 +202,7 @@ def _swapped_scene(services: Services, held: Session, swap: "Swap") -> Json:
     marks = [np.zeros(level.size, bool) for level in swap.levels]
     marks[swap.scale - 1][swap.position] = True
     strip = scene.joint_strip("difference", f"What moves when code {swap.before} becomes {swap.code}", swap.difference)
-    return _scene(held, figures, _track(services, held, swap.levels, marks, "replaced"), [strip])
+    return _scene(services, held, figures, _track(services, held, swap.levels, marks, "replaced"), [strip])
 
 
 def _language_scene(services: Services, held: Session, language: "Language") -> Json:
@@ -202,7 +218,7 @@ def _language_scene(services: Services, held: Session, language: "Language") -> 
     track = _track(services, held, language.captioned, flips, words)
     found = held.found.attention
     strips = [] if found is None else [words_strip("Which words the detokenizer looks at", found.words, found.weights)]
-    return _scene(held, figures, track, strips)
+    return _scene(services, held, figures, track, strips)
 
 
 def _original(tokenized: "Tokenized") -> Json:
@@ -224,6 +240,7 @@ def _track(
     return score(system, frames, levels, services.palettes(system.name), spans=spans, marks=marks, marked=marked)
 
 
-def _scene(held: Session, figures: list[Json], track: Json, strips: Sequence[Json] = ()) -> Json:
+def _scene(services: Services, held: Session, figures: list[Json], track: Json, strips: Sequence[Json] = ()) -> Json:
     shown = f"{held.example}|{held.source and held.source.title}|{held.start}|{held.part}|{held.system}|{held.caption}"
-    return scene.payload(figures, [track], strips=strips, scene=shown)
+    others = [one.track(services) for one in companions(services, held)]
+    return scene.payload(figures, [track, *others], strips=strips, scene=shown)

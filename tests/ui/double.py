@@ -6,7 +6,7 @@ scales are used, so that the error falls with every scale as the real one does.
 
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -48,30 +48,34 @@ def tokens(seed: int) -> tuple[LevelTokens, ...]:
     return tuple(LevelTokens(s, c, rng.integers(0, c, s)) for s, c in zip(SIZES, CODES, strict=True))
 
 
-@lru_cache(maxsize=1)
-def stored_analysis() -> Bundle:
+@lru_cache(maxsize=4)
+def stored_analysis(
+    system: str = "lgtok-lite", sizes: tuple[int, ...] = SIZES, codes: tuple[int, ...] = CODES, frames: int = 80
+) -> Bundle:
     """A map of 90 clips in three groups with random tokens."""
     rng = np.random.default_rng(5)
     groups = ["walk", "wave", "sit"] * 30
     centres = {"walk": (0.0, 0.0), "wave": (6.0, 1.0), "sit": (2.0, 6.0)}
     points = np.array([centres[group] for group in groups]) + rng.normal(size=(90, 2))
-    clips = tuple(BundleClip(f"c{n}", n, "take", group, f"a person does {group}", 80) for n, group in enumerate(groups))
-    ids = [np.minimum(rng.geometric(0.02, (90, size)), codes) - 1 for size, codes in zip(SIZES, CODES, strict=True)]
+    clips = tuple(
+        BundleClip(f"c{n}", n, "take", group, f"a person does {group}", frames) for n, group in enumerate(groups)
+    )
+    ids = [np.minimum(rng.geometric(0.02, (90, size)), most) - 1 for size, most in zip(sizes, codes, strict=True)]
     means = np.concatenate([points, rng.normal(size=(90, 6))], axis=1).astype(np.float32)
-    energy = np.tile(0.7 ** np.arange(len(SIZES) + 1), (90, 1)).astype(np.float32)
+    energy = np.tile(0.7 ** np.arange(len(sizes) + 1), (90, 1)).astype(np.float32)
     return Bundle(
-        "lgtok-lite", "fake00000000", "made up", "test", 0, 30.0, (0.4, 0.2), 0.7, 0.33, SIZES, CODES, {}, "", clips,
+        system, "fake00000000", "made up", "test", 0, 30.0, (0.4, 0.2), 0.7, 0.33, sizes, codes, {}, "", clips,
         means, points.astype(np.float32), points[:, ::-1].astype(np.float32).copy(),
-        np.concatenate(ids, axis=1).astype(np.int16), counts_of(ids, CODES), energy, np.full(90, 40.0, np.float32),
-        np.zeros(8, np.float32), np.eye(2, 8, dtype=np.float32), *_token_map(rng),
+        np.concatenate(ids, axis=1).astype(np.int16), counts_of(ids, codes), energy, np.full(90, 40.0, np.float32),
+        np.zeros(8, np.float32), np.eye(2, 8, dtype=np.float32), *_token_map(rng, sizes),
     )  # fmt: skip
 
 
-def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
-    """Index, centre, axes, scores and places of 200 tokens: 20 of every scale."""
-    scale = np.repeat(np.arange(1, len(SIZES) + 1), 20)
-    index = np.stack([rng.integers(0, 90, 200), scale, rng.integers(0, np.array(SIZES)[scale - 1])], axis=1)
-    scores = (rng.normal(size=(200, 3)) + scale[:, None] * [1.0, 0.5, 0.0]).astype(np.float16)
+def _token_map(rng: np.random.Generator, sizes: tuple[int, ...]) -> tuple[NDArray[Any], ...]:
+    """Index, centre, axes, scores and places of 20 tokens of every scale."""
+    scale = np.repeat(np.arange(1, len(sizes) + 1), 20)
+    index = np.stack([rng.integers(0, 90, len(scale)), scale, rng.integers(0, np.array(sizes)[scale - 1])], axis=1)
+    scores = (rng.normal(size=(len(scale), 3)) + scale[:, None] * [1.0, 0.5, 0.0]).astype(np.float16)
     places = (scores[:, :2] * 4).astype(np.float32)
     return index.astype(np.int32), np.zeros(8, np.float32), np.eye(3, 8, dtype=np.float32), scores, places
 
@@ -79,12 +83,16 @@ def _token_map(rng: np.random.Generator) -> tuple[NDArray[Any], ...]:
 class FakeEngine(Drawing, Studies, Endless):
     """What the rooms use of the engine. `pause` is called before every scale of a generation.
 
-    denoises: with a second system, DENOISER, that makes motions without tokens.
+    denoises: with a second system, DENOISER, that makes motions without tokens; others: with these systems of the
+    table, which have the same scales.
     """
 
-    def __init__(self, pause: Callable[[], None] = lambda: None, denoises: bool = False) -> None:
+    def __init__(
+        self, pause: Callable[[], None] = lambda: None, denoises: bool = False, others: Sequence[str] = ()
+    ) -> None:
         self.pause = pause
         self.denoises = denoises
+        self.others = tuple(others)
         self.calls: list[str] = []
         self.assets = Path(tempfile.mkdtemp(prefix="stand-in-"))
         write_bundle(self.assets / "analysis", stored_analysis())
@@ -94,7 +102,15 @@ class FakeEngine(Drawing, Studies, Endless):
         name, text = "LG-Tok transformer", "minilm"
         own = SystemInfo("lgtok-lite", "LG-Tok lite", "lgtok", name, "sar", text, 13_000_000, "none", "shipped", facts)
         other = replace(own, name=DENOISER, title="MDM with CASIM, decoder", family="mdm", tokenizer=None)
-        return [own, replace(other, sampling=SYSTEMS[DENOISER].sampling)] if self.denoises else [own]
+        rows = [SYSTEMS[one] for one in self.others]
+        more = [
+            replace(own, name=row.name, title=row.title, family=row.family, generator=row.generator,
+                    sampling=row.sampling) for row in rows
+        ]  # fmt: skip
+        return [own, *more, *([replace(other, sampling=SYSTEMS[DENOISER].sampling)] if self.denoises else [])]
+
+    def reads_words(self, system: str) -> bool:
+        return system.startswith("lgtok") and system != "lgtok-notext"
 
     def scales(self, system: str) -> list[tuple[int, int]]:
         return [] if system == DENOISER else list(zip(SIZES, CODES, strict=True))
@@ -126,7 +142,8 @@ class FakeEngine(Drawing, Studies, Endless):
         self.calls.append("tokenize")
         caption = normalise(caption, what="caption", allow_empty=True)
         _, cut = prepare(motion)
-        levels = tokens(zlib.crc32(cut.joints.tobytes() + caption.encode()))
+        own = "" if system == "lgtok-lite" else system
+        levels = tokens(zlib.crc32(cut.joints.tobytes() + f"{caption}{own}".encode()))
         scale = np.linspace(1, 0.2, len(SIZES))[:, None, None]
         per_level = (np.random.default_rng(0).normal(size=(len(SIZES), 36, 16)) * scale).astype(np.float32)
         energy = np.concatenate([[1.0], 0.7 * 0.7 ** np.arange(len(SIZES))]).astype(np.float32)

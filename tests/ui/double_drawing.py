@@ -71,7 +71,8 @@ class Drawing:
         self, source: Any, span: Sequence[int] | None, prompt: str | None, seed: int = 0, kind: str = "inpaint",
         system: str = "lgtok-lite", caption: str | None = None, anchor: str = "place", **options: Any,
     ) -> Edited:  # fmt: skip
-        self.calls.append(f"edit {kind} {span} {prompt} {seed}")
+        used = system if isinstance(source, Motion) else source.system
+        self.calls.append(f"edit {kind} {span} {prompt} {seed} {used}")
         if isinstance(source, Motion):
             source = self.tokenize(source, source.caption if caption is None else caption, system)
         frames = source.motion.frames

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from playground.engine import default_engine
-from playground.errors import PlaygroundError
 from playground.systems import SYSTEMS
 from playground.ui.code import python_for
 from playground.ui.drawing import Visit, Wish, wish_values
@@ -82,6 +81,15 @@ def test_the_next_motions_show_theirs_until_it_is_switched_off(do: Handlers, eng
     assert len(stage(back[0])["strips"]) == 1 and visit.looked is not None and visit.looked[0].seed == 3
 
 
+def test_of_several_motions_the_map_says_whose_it_is(do: Handlers, engine: FakeEngine) -> None:
+    visit = Visit(words=True)
+    *_, last = do.generate(visit, PROMPT, False, *NUMBERS[:7], 2, False, DENOISER)
+    assert stage(last[0])["strips"][0]["name"] == "Which words the denoiser looks at, seed 3"
+    assert [figure["caption"] for figure in stage(last[0])["figures"]] == ["", ""]
+    other = do.look_at(visit, "1")
+    assert stage(other[0])["strips"][0]["name"].endswith("seed 4") and engine.calls[-1] == "alignment 4"
+
+
 def test_a_motion_without_words_says_so(do: Handlers) -> None:
     visit = Visit(words=True)
     last = made(do, visit, free=True)
@@ -107,7 +115,7 @@ def test_a_system_without_tokens_draws_step_by_step(do: Handlers) -> None:
     assert notes == [*(f"step {n} of {DENOISED}" for n in range(1, DENOISED)), ""]
     shown = stage(values[0])
     assert shown["tracks"] == [] and shown["strips"][0]["name"] == "Which words the denoiser looks at"
-    assert "nan" not in values[1] and "no tokens" in values[1] and "edit" not in values[2]
+    assert "nan" not in values[1] and "no tokens" in values[1] and "Edit this motion" in values[2]
     visit.stop = False
     said = []
     for values in do.generate(visit, PROMPT, False, *NUMBERS, DENOISER):
@@ -135,10 +143,11 @@ def test_another_system_brings_its_own_sampling(do: Handlers, engine: FakeEngine
         assert not controls(View(stage={}), do.services)[1].visible
 
 
-def test_edit_takes_motions_of_its_own_system_alone(do: Handlers) -> None:
+def test_edit_reads_a_motion_without_tokens_as_tokens(do: Handlers) -> None:
     room = edit.Handlers(do.services, View(stage={}))
-    with pytest.raises(PlaygroundError, match="motions of LG-Tok lite are edited here"):
-        room.last(f"?room=generate&prompt=a+person+sits&system={DENOISER}", "inpaint", edit.EditSession())
+    shown = room.last(f"?room=generate&prompt=a+person+sits&system={DENOISER}", "inpaint", edit.EditSession())
+    assert shown[1].text == "MDM with CASIM, decoder writes no tokens; LG-Tok lite has read its motion as tokens."
+    assert shown[0].base.system == shown[11] == "lgtok-lite" and shown[6].endswith(f"_{DENOISER}")
 
 
 def test_a_map_of_marks_alone_has_a_ramp_too() -> None:

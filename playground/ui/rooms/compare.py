@@ -74,7 +74,8 @@ def compare(services: Services, held: Held, *values: Any, take: int = 0) -> Iter
         origin = origin_of(services, name, said["caption"])
         held.name, held.source = origin.title, origin.motion
         text = held.source.caption if of == MOTION else prompt
-    settings = settings_of(services, vary, picked or (), text, seconds, seed, str(said["kind"]), span_of(said))
+    edit = (str(said["kind"]), span_of(said))
+    settings = settings_of(services, vary, picked or (), text, seconds, seed, *edit, held.link.system)
     for done in run(services, settings, held.source):
         held.done = done
         yield compared_view(services, done, held.source, held.name, take)

@@ -15,6 +15,7 @@ from playground.ui.editing import (
     NAME,
     EditSession,
     EditWish,
+    editor_of,
     file_name,
     motion_of,
     open_source,
@@ -53,15 +54,16 @@ SHOW_SPAN = """(start, stop) => {
   if (start !== null && stop !== null && span[1] > span[0]) window.MotionStage?.restore('edit', { span });
 }"""
 KEEP = (
-    "(motion, caption) => window.mtpState?.keep('edit', "
-    f"{json.dumps(['motion', 'caption', *WISHES, 'start', 'selection'])}, [motion, caption || null])"
+    "(motion, caption, system) => window.mtpState?.keep('edit', "
+    f"{json.dumps(['motion', 'caption', 'system', *WISHES, 'start', 'selection'])}, "
+    "[motion, caption || null, system === %s ? null : system])"
 )  # another motion: what was asked of the one before goes
 
 
 class Handlers:
     """What the controls do. A handler that shows a motion returns the values of `shown` in `room`: the session, stage,
     facts, seams, promise, menu, the motion's name and caption for the address, the window of a long file, start and end
-    of the span."""
+    of the span, the system. Where the system may be another one, its own g and s follow."""
 
     def __init__(self, services: Services, opening: View) -> None:
         self.services = services
@@ -86,16 +88,28 @@ class Handlers:
         return self._source(open_source(self.services, session, session.name, session.caption, float(second)), kind)
 
     def last(self, address: str, kind: str, held: EditSession) -> tuple[Any, ...]:
-        """What the room Generate shows, by its address."""
+        """What the room Generate shows, by its address, with its system where that can edit."""
         state = parse(address)
         wish = Wish.checked(*wish_values(self.services, state))
-        usual = self.services.system()
-        if wish.system != usual.name:
-            raise PlaygroundError(f"motions of {usual.title} are edited here; generate one with it to take it along")
         changes = read_changes(state["changes"])
         seed = wish.seed if changes else wish.seeds[min(int(state["take"]), wish.takes - 1)]
         name = made_name(wish, seed, changes)
-        return self._source(open_source(self.services, held, name, wish.prompt or ""), kind)
+        if not name:
+            raise PlaygroundError("this motion was changed too often to be taken along; generate a new one")
+        able = wish.system in [one.name for one in self.services.editors()]
+        held, note = replace(held, system=wish.system if able else held.system), ""
+        if not able:
+            maker, reader = (self.services.system(one).title for one in (wish.system, held.system))
+            note = f"{maker} writes no tokens; {reader} has read its motion as tokens."
+        shown = self._source(open_source(self.services, held, name, wish.prompt or ""), kind, note)
+        return *shown, *self._numbers(held.system)
+
+    def change(self, system: str, kind: str, held: EditSession) -> tuple[Any, ...]:
+        """Another system: its tokens of the same motion, and its own numbers."""
+        name, _ = editor_of(self.services, system)
+        session = replace(self._held(held), system=name)
+        opened = open_source(self.services, session, session.name, session.caption, session.start)
+        return *self._source(opened, kind), *self._numbers(name)
 
     def set_kind(self, kind: str, held: EditSession) -> tuple[Any, ...]:
         """Another kind of edit, with the span of the published benchmark for it."""
@@ -109,7 +123,9 @@ class Handlers:
 
     def arrive(self, held: EditSession, event: gr.EventData) -> tuple[Any, ...]:
         """What a link asks for: the controls, then the result, or the motion alone where nothing is said of an edit."""
-        state, own = asked(event), self.services.sampling()
+        state = asked(event)
+        system, note = editor_of(self.services, state.system)
+        held, own = replace(held, system=system), self.services.sampling(system)
         wanted = str(state["motion"] or opening_motion(self.services))
         known = {one.id for one in self.services.examples()}
         if not wanted.startswith((MADE, OWN_FILE)) and wanted not in known:
@@ -118,20 +134,28 @@ class Handlers:
         usual = {"g": own.guidance, "s": own.cfg}
         values = [state.values.get(key, usual.get(key, state[key])) for key in WISHES]
         edits = set(state.values) - {"motion", "start", "caption", "selection", "system"}
-        shown = self._edited(session, EditWish.checked(*values)) if edits else self._source(session, str(values[1]))
+        if edits:
+            shown = self._edited(session, EditWish.checked(*values), note)
+        else:
+            shown = self._source(session, str(values[1]), note)
         return *shown, values[0], values[1], *values[4:], _about(str(values[1]))
 
     def _source(self, session: EditSession, kind: str, note: str = "") -> tuple[Any, ...]:
         view = source_view(self.services, session)
         start, stop = benchmark_span(kind, motion_of(session).frames)
         stage = Noted(view.stage_json(), note)
-        return session, stage, "", "", "", *self._names(session), start / LIMITS.fps, stop / LIMITS.fps
+        names, system = self._names(session), self.services.system(session.system).name
+        return session, stage, "", "", "", *names, start / LIMITS.fps, stop / LIMITS.fps, system
 
-    def _edited(self, session: EditSession, wish: EditWish) -> tuple[Any, ...]:
+    def _edited(self, session: EditSession, wish: EditWish, note: str = "") -> tuple[Any, ...]:
         view = run(self.services, session, wish)
-        own = view.controls
-        told = (view.stage_json(), view.facts_html(), own["seams"], _promise(own["promise"]))
-        return session, *told, *self._names(session), own["from"], own["to"]
+        own, system = view.controls, self.services.system(session.system).name
+        told = (Noted(view.stage_json(), note), view.facts_html(), own["seams"], _promise(own["promise"]))
+        return session, *told, *self._names(session), own["from"], own["to"], system
+
+    def _numbers(self, system: str) -> tuple[float, float]:
+        own = self.services.sampling(system)
+        return own.guidance, own.cfg
 
     def _names(self, session: EditSession) -> tuple[Any, ...]:
         choices = self.services.example_choices()
@@ -171,36 +195,41 @@ def room(services: Services) -> None:
         door = link_door(NAME)
         gr.HTML("", js_on_load=SPANNING, apply_default_css=False, elem_classes=["mtp-unseen"])
         unseen = [gr.Textbox(elem_classes=["mtp-unseen"], show_label=False, container=False) for _ in range(3)]
-    shown = [session, stage, facts, seams, promise, example, *unseen[:2], window, wishes["from"], wishes["to"]]
+    span = [wishes["from"], wishes["to"]]
+    shown = [session, stage, facts, seams, promise, example, *unseen[:2], window, *span, wishes["system"]]
     _wire(Handlers(services, opening), shown, wishes, (upload, last, unseen[2], door), message)
 
 
 def _wire(do: Handlers, shown: list[Any], wishes: dict[str, Any], ways_in: tuple[Any, ...], message: Any) -> None:
     """What happens at which event."""
-    session, stage, _, _, _, example, name, caption, window, start, stop = shown
+    session, stage, _, _, _, example, name, caption, window, start, stop, system = shown
     upload, last, address, door = ways_in
     kind, about, go = wishes["kind"], wishes["about"], wishes["go"]
     own: dict[str, Any] = {"stage": NAME, "doing": OPENING}
     silent: dict[str, Any] = {"api_visibility": "private"}
-    asks = [wishes[key] for key in WISHES]
+    asks, numbers = [wishes[key] for key in WISHES], [wishes["g"], wishes["s"]]
     opened = [attach(example.input, do.choose, [example, kind, session], shown, message, **own)]
     opened.append(attach(upload.upload, do.bring, [upload, kind, session], shown, message, **own))
     told = last.click(None, None, [address], js="() => window.mtpState?.query('generate') ?? ''", **silent)
-    opened.append(attach(told.then, do.last, [address, kind, session], shown, message, stage=NAME, doing=LAST))
+    came = attach(told.then, do.last, [address, kind, session], [*shown, *numbers], message, stage=NAME, doing=LAST)
+    opened.append(came)
+    opened.append(attach(system.input, do.change, [system, kind, session], [*shown, *numbers], message, **own))
     opened.append(attach(window.input, do.move, [window, kind, session], shown, message,
                          trigger_mode="always_last", **own))  # fmt: skip
     opened.append(attach(kind.input, do.set_kind, [kind, session], [session, about, start, stop], message))
     for event in opened:
         event.then(None, [start, stop], None, js=SHOW_SPAN, **silent)
+    keep = KEEP % json.dumps(system.value)
     for event in opened[:3]:
-        event.then(None, [name, caption], None, js=KEEP, **silent)
+        event.then(None, [name, caption, system], None, js=keep, **silent)
+    commits(NAME, {"system": system}, system.input, forget=(*WISHES, "selection"))
     commits(NAME, {"start": window}, window.input, forget=(*WISHES, "selection"))
     for number in (start, stop):
         number.input(None, [start, stop], None, js=SHOW_SPAN, **silent)
     stage.span(None, [start, stop], [start, stop], js=READ_SPAN, **silent)
     for event in (go.click, wishes["prompt"].submit):
         attach(event, do.repaint, [session, *asks], shown, message, stage=NAME, doing=DOING)
-        commits(NAME, {key: wishes[key] for key in WISHES}, event, forget=("selection",))
+        commits(NAME, {key: wishes[key] for key in WISHES} | {"system": system}, event, forget=("selection",))
     others = [wishes[key] for key in (*WISHES[:2], *WISHES[4:])]
     arrival(door, do.arrive, [session], [*shown, *others, about], message, room=NAME, stage=NAME, doing=DOING)
 
@@ -220,21 +249,27 @@ def _sources(services: Services, opening: View) -> tuple[Any, ...]:
 
 
 def _controls(services: Services, opening: View) -> dict[str, Any]:
-    """The controls by their keys, with the button and the line that says what the kind does."""
-    own, made = services.sampling(), opening.controls
+    """The controls by their keys, with the button and the line that says what the kind does, and the system where
+    there are several that can do it."""
+    own, made, able = services.sampling(), opening.controls, services.editors()
     most = LIMITS.max_seconds
     found: dict[str, Any] = {}
     found["kind"] = gr.Radio(
         [(title, key) for key, (title, _) in KINDS.items()], value="inpaint", label=control(NAME, "kind").label,
         elem_id="edit-kind",
     )  # fmt: skip
+    found["about"] = gr.HTML(_about("inpaint"), elem_id="edit-about", apply_default_css=False)
     with gr.Row(elem_classes=["mtp-line", "mtp-span"]):
         for key in ("from", "to"):
             found[key] = gr.Number(
                 made.get(key), label=control(NAME, key).label, minimum=0, maximum=most, step=0.05,
                 elem_id=control(NAME, key).element, min_width=64, scale=0,
             )  # fmt: skip
-        found["about"] = gr.HTML(_about("inpaint"), elem_id="edit-about", apply_default_css=False)
+        row = control(NAME, "system")
+        found["system"] = gr.Dropdown(
+            [(one.title, one.name) for one in able], value=able[0].name if able else None, label=row.label,
+            elem_id=row.element, visible=len(able) > 1, scale=1, min_width=140,
+        )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line"]):
         found["prompt"] = gr.Textbox(
             made.get("prompt", control(NAME, "prompt").default), label=control(NAME, "prompt").label, max_lines=1,

@@ -150,7 +150,7 @@ class Handlers:
         visit.words = on is True
         result = self._held(visit)
         looked, why = self._looked(visit, result.takes[visit.take])
-        view = with_words(result_view(self.services, result, visit.take), looked)
+        view = with_words(result_view(self.services, result, visit.take), looked, result, visit.take)
         return view.stage_json(), words_card(looked, why)
 
     def bring_back(self, visit: Visit, event: gr.EventData) -> tuple[Any, ...]:
@@ -185,8 +185,9 @@ class Handlers:
         card = self._card(visit, result) if visit.token else ""
         told, made = ", then ".join(one.words for one in result.changes), result.takes[visit.take]
         looked, why = self._looked(visit, made)
-        stage = Noted(with_words(view, looked).stage_json(), f"{told[:1].upper()}{told[1:]}." if told else "")
-        links = onward(result, visit.take, self.services.system().name)
+        view = with_words(view, looked, result, visit.take)
+        stage = Noted(view.stage_json(), f"{told[:1].upper()}{told[1:]}." if told else "")
+        links = onward(result, visit.take, [one.name for one in self.services.editors()])
         told_of = (links, earlier(visit), which, write_changes(result.changes), card)
         seen = (self._switch(made.system), words_card(looked, why))
         return stage, view.facts_html(), *told_of, *(result.address[key] for key in WISHES), *seen
@@ -203,9 +204,10 @@ class Handlers:
                 return None, str(error)
         return visit.looked[1], ""
 
-    def _switch(self, system: str, **value: bool) -> Any:
+    def _switch(self, system: str, value: bool | None = None) -> Any:
         """The switch of the words, for a system that has something to tell; its visitor alone turns it, or a link."""
-        return gr.update(visible=self.services.engine().looks_at_words(system), **value)
+        able = self.services.engine().looks_at_words(system)
+        return gr.update(visible=able) if value is None else gr.update(visible=able, value=value)
 
     def _card(self, visit: Visit, result: Result) -> str:
         assert visit.token is not None

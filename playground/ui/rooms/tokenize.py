@@ -1,10 +1,13 @@
 """Room 1: a motion becomes tokens, scale by scale, and comes back; its tokens and its words under the microscope."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import gradio as gr
 
 from playground.limits import LIMITS
+from playground.ui.beside import MOST, side_by_side
 from playground.ui.chart import chart
 from playground.ui.closer import Closer
 from playground.ui.closerviews import bind_closer, closer_views
@@ -16,7 +19,7 @@ from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, UPLOADED, State, Token, control
-from playground.ui.tokenizing import NAME, Session, open_session, run, scales_of, window_of
+from playground.ui.tokenizing import NAME, Session, open_session, ready, run, scales_of, window_of
 from playground.ui.uploads import Source, read_upload
 from playground.ui.view import View
 
@@ -24,6 +27,7 @@ LEAD = (
     "Left, a motion; below, its tokens; right, what comes back from the tokens alone. Click a token to take it apart."
 )
 DOING, AGAIN, LOOKING = "Tokenizing", "Rebuilding", "Looking closely"
+SYSTEMS = "Systems side by side, the first one's tokens can be taken apart"
 KINDS = [("1 to n", "upto"), ("only n", "only"), ("without n", "without")]
 MARK_SCALES = """(n, kind) => {
   const stage = window.MotionStage?.get('tokenize');
@@ -54,22 +58,26 @@ class Handlers:
 
     def choose(self, wanted: str, held: Session | None) -> tuple[Any, ...]:
         """Another motion of the menu, with its own caption; as it is stored, where it is."""
-        upload, system = (held.upload, held.system) if held else (None, "")
+        upload, system, beside = (held.upload, held.system, held.beside) if held else (None, "", ())
+        how: dict[str, Any] = {"upload": upload, "system": system, "beside": beside}
         if wanted == UPLOADED and upload is not None:
-            return self._show(Session(UPLOADED, upload, caption=upload.caption, upload=upload, system=system))
+            return self._show(Session(UPLOADED, upload, caption=upload.caption, **how))
         found = self.services.example(wanted)
-        stored = self.services.preset(NAME, wanted) if system in ("", self.services.default_system().name) else None
+        usual = system in ("", self.services.default_system().name) and not beside
+        stored = self.services.preset(NAME, wanted) if usual else None
         if stored is not None:
-            held = Session(wanted, caption=found.caption, upload=upload, system=system)
+            held = Session(wanted, caption=found.caption, **how)
             return self._told(held, stored)
         source = Source(found.motion(), found.title)
-        return self._show(Session(wanted, source, caption=found.caption, upload=upload, system=system))
+        return self._show(Session(wanted, source, caption=found.caption, **how))
 
     def bring(self, path: str | None, held: Session | None) -> tuple[Any, ...]:
         """A file of the visitor's own, with the caption that it carries, if any."""
         source = read_upload(path)
-        system = held.system if held else ""
-        session = Session(UPLOADED, source, caption=source.caption, upload=source, system=system)
+        system, beside = (held.system, held.beside) if held else ("", ())
+        session = Session(
+            UPLOADED, source, caption=source.caption, upload=source, system=system, beside=beside
+        )  # fmt: skip
         return self._show(session, note=f"{source.title}: {source.note}")
 
     def again(self, text: str, held: Session | None) -> tuple[Any, ...]:
@@ -93,15 +101,21 @@ class Handlers:
         """A click on the speed curve: the part that it is in."""
         return self.cut(str(event.id), held)
 
-    def change(self, system: str, held: Session | None) -> tuple[Any, ...]:
-        """Another system."""
-        return self._show(self._open(held).forgetful(system=str(system)))
+    def change(self, systems: Sequence[str], held: Session | None) -> tuple[Any, ...]:
+        """Other systems: the first one's tokens are taken apart, the rest stand beside it."""
+        session, (first, beside) = self._open(held), side_by_side(self.services, systems)
+        if first == (session.system or self.services.default_system().name):
+            return self._show(replace(session, beside=beside))
+        return self._show(session.forgetful(system=first, beside=beside))
 
     def rebuild(self, used: float, kind: str, held: Session | None) -> tuple[Any, ...]:
         """The same tokens, another set of scales."""
         from playground.findings import ScaleSet
 
-        held, view = run(self.services, self._open(held), ScaleSet.of(f"{kind}:{int(used)}", 999))
+        session = ready(self.services, self._open(held))
+        assert session.tokenized is not None
+        count = len(session.tokenized.levels)  # the slider of a single scale has a second stop that means nothing
+        held, view = run(self.services, session, ScaleSet.of(f"{kind}:{min(int(used), count)}", count))
         return self._parts(held, view)
 
     def stop_at(self, kind: str, held: Session | None, event: gr.EventData) -> tuple[Any, ...]:
@@ -125,8 +139,7 @@ class Handlers:
             source = Source(found.motion(), found.title)
             session = Session(found.id, source, caption=found.caption, upload=upload)
         session.caption = state.values.get("caption", session.caption)
-        shipped = {system.name for system in self.services.shipped("tokenizer")}
-        session.system = state.system if state.system in shipped else ""
+        session.system, session.beside = side_by_side(self.services, state["system"] or ())
         session.wish = state["code"] if isinstance(state["selection"], Token) else None
         shown = [*self._show(session, note, state), gr.skip()]
         if state["wrong"]:
@@ -149,10 +162,11 @@ class Handlers:
         source = held.source
         last = max(0.1, round(source.last_start, 1), held.start) if source else 0.1
         window = gr.update(maximum=last, value=held.start)
-        steps = gr.update(maximum=max(2, view.controls["count"]), value=view.controls["scales"])
+        count = view.controls["count"]
+        steps = gr.update(maximum=max(2, count), value=view.controls["scales"], interactive=count > 1)
         session, stage, *rest = self._parts(held, view)
-        system = held.system or self.services.default_system().name
-        told = (menu, held.caption, window, steps, view.controls["kind"], system, *self._cuts(held))
+        systems = [held.system or self.services.default_system().name, *held.beside]
+        told = (menu, held.caption, window, steps, view.controls["kind"], systems, *self._cuts(held))
         return session, Noted(stage, note), *rest, *told
 
     def _cuts(self, held: Session) -> tuple[Any, ...]:
@@ -227,13 +241,13 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
             services.example_choices(), value=opening.controls.get("example"), label="Motion",
             elem_id="tokenize-example", scale=2, min_width=160,
         )  # fmt: skip
-        system = gr.Dropdown(
-            [(one.title, one.name) for one in shipped], value=usual, scale=1,
-            label=control(NAME, "system").label, elem_id="tokenize-system", visible=len(shipped) > 1, min_width=120,
-        )  # fmt: skip
         upload = gr.UploadButton(
             "Upload", file_count="single", size="sm", scale=0, min_width=84, elem_id="tokenize-upload"
         )
+    system = gr.Dropdown(
+        [(one.title, one.name) for one in shipped], value=[usual] if usual else [], multiselect=True,
+        max_choices=MOST + 1, label=SYSTEMS, elem_id="tokenize-system", visible=len(shipped) > 1,
+    )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-caption"]):
         caption = gr.Textbox(
             opening.controls.get("caption", ""), label=control(NAME, "caption").label,
