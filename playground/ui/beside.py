@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from playground.figures import stage as scene
 from playground.figures.stage import ORIGINAL_ID, Json
 from playground.limits import LIMITS
+from playground.motion.motion import Motion
 from playground.ui.facts import millimetres
 from playground.ui.scenes import score
 from playground.ui.services import Services
@@ -37,19 +38,14 @@ class Companion:
         return score(self.system, frames, self.tokenized.levels, palettes)
 
 
-def companion(services: Services, tokenized: "Tokenized", name: str) -> Companion:
-    """The motion of `tokenized`, with the same caption, through another system. PlaygroundError if it is not here."""
+def companion(services: Services, motion: Motion, caption: str, name: str) -> Companion:
+    """The motion with its caption through another system. PlaygroundError if it is not here."""
     engine = services.engine()
-    other = engine.tokenize(tokenized.motion, tokenized.caption, system=name)
+    other = engine.tokenize(motion, caption, system=name)
     return Companion(services.system(name), other, engine.reconstruct(other))
 
 
-def side_by_side(services: Services, wanted: object) -> tuple[str, tuple[str, ...]]:
-    """What a choice of systems means: the one whose tokens are taken apart, "" for the usual one, and the others.
-
-    Names that are not shipped with a tokenizer are left out, and so is what is more than a stage holds.
-    """
+def beside_it(services: Services, wanted: Sequence[object]) -> tuple[str, ...]:
+    """The systems of a choice that are shipped with a tokenizer, as many as a stage holds."""
     shipped = {system.name for system in services.shipped("tokenizer")}
-    names: Sequence[object] = wanted if isinstance(wanted, list | tuple) else [wanted]
-    known = [name for name in dict.fromkeys(str(name) for name in names) if name in shipped]
-    return (known[0], tuple(known[1 : MOST + 1])) if known else ("", ())
+    return tuple(name for name in dict.fromkeys(map(str, wanted)) if name in shipped)[:MOST]

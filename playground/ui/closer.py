@@ -66,11 +66,9 @@ class Closer:
     def _check_whose(self, held: Session, chosen: Any) -> None:
         """PlaygroundError for a token of a system that stands beside the first one."""
         first = system_of(self.services, held)
-        if chosen.get("system", first.name) in held.beside:
+        if chosen.get("system", first.name) in held.beside and chosen["system"] != first.name:
             whose = self.services.system(str(chosen["system"])).title
-            raise PlaygroundError(
-                f"this is a token of {whose}; only the first system's tokens are taken apart: choose {whose} first"
-            )
+            raise PlaygroundError(f"this is a token of {whose}; choose {whose} under System to take its tokens apart")
 
     def _place(self, held: Session, chosen: Any) -> tuple[int, int]:
         try:

@@ -55,8 +55,8 @@ def _tokenize(state: State) -> tuple[str, str]:
 
 
 def _beside(state: State) -> str:
-    """The other systems that stand beside the first one, all their scales."""
-    others = tuple(state.values.get("system") or ())[1:]
+    """The systems that stand beside it, with all their scales."""
+    others = tuple(name for name in state["beside"] or () if name != state.system)
     if not others:
         return ""
     return (

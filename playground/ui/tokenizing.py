@@ -182,11 +182,11 @@ def stage_of(services: Services, held: Session) -> Json:
 
 def companions(services: Services, held: Session) -> list[Companion]:
     """The systems beside the first one, each with its tokens of the motion; made once."""
-    assert held.tokenized is not None
+    assert held.tokenized is not None and held.source is not None
     made, first = held.found.beside, system_of(services, held).name
     for name in held.beside:
         if name != first and name not in made:
-            made[name] = companion(services, held.tokenized, name)
+            made[name] = companion(services, held.source.motion.slice(*window_of(held)), held.tokenized.caption, name)
     return [made[name] for name in held.beside if name in made]
 
 

@@ -84,7 +84,7 @@ def choose(page: Page, room: str, name: str) -> None:
 
 @pytest.mark.parametrize("name", TOKENIZE)
 def test_a_motion_becomes_tokens_and_comes_back(page: Page, engine: Engine, name: str) -> None:
-    choose(page, "tokenize", name)
+    follow(page, f"?room=tokenize&system={name}")
     count = len(engine.scales(name))
     shown(page, "tokenize", f"track.system === '{name}' && whole && track.levels.length === {count}")
     expect(page.locator("#tokenize-stage .ms-labels")).to_contain_text(SYSTEMS[name].title)
@@ -97,8 +97,9 @@ def test_a_motion_becomes_tokens_and_comes_back(page: Page, engine: Engine, name
 
 @pytest.mark.parametrize("name", ANALYSED)
 def test_a_token_under_the_microscope_and_codes(page: Page, engine: Engine, name: str) -> None:
-    choose(page, "tokenize", name)
+    follow(page, f"?room=tokenize&system={name}")
     count = len(engine.scales(name))
+    shown(page, "tokenize", f"track.system === '{name}' && whole")
     chosen = f"{{ selection: {{ system: '{name}', scale: {count}, position: 0 }} }}"
     page.evaluate(f"() => MotionStage.get('tokenize').store.commit('select', {chosen})")
     card = page.locator("#tokenize-token .mtp-token")
@@ -131,8 +132,10 @@ def test_words_become_a_motion(page: Page, engine: Engine, name: str) -> None:
 @pytest.mark.parametrize("name", EDIT)
 def test_a_span_is_repainted(page: Page, name: str) -> None:
     choose(page, "edit", name)
-    own = SYSTEMS[name].sampling
-    expect(page.locator("#edit-s input[type=range]")).to_have_value(f"{own.cfg:g}")
+    strength = page.locator("#edit-s input[type=range]")
+    if not strength.is_visible():
+        page.get_by_role("tabpanel", name="Edit").get_by_role("button", name="More").click()
+    expect(strength).to_have_value(f"{SYSTEMS[name].sampling.cfg:g}")
     page.evaluate(REMEMBER, "edit")
     page.locator("#edit-go").click()
     after = f"data.figures.length === 2 && data.figures[1].system === '{name}' && data.hatch.length"

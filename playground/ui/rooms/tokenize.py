@@ -7,7 +7,7 @@ from typing import Any
 import gradio as gr
 
 from playground.limits import LIMITS
-from playground.ui.beside import MOST, side_by_side
+from playground.ui.beside import MOST, beside_it
 from playground.ui.chart import chart
 from playground.ui.closer import Closer
 from playground.ui.closerviews import bind_closer, closer_views
@@ -27,7 +27,6 @@ LEAD = (
     "Left, a motion; below, its tokens; right, what comes back from the tokens alone. Click a token to take it apart."
 )
 DOING, AGAIN, LOOKING = "Tokenizing", "Rebuilding", "Looking closely"
-SYSTEMS = "Systems side by side, the first one's tokens can be taken apart"
 KINDS = [("1 to n", "upto"), ("only n", "only"), ("without n", "without")]
 MARK_SCALES = """(n, kind) => {
   const stage = window.MotionStage?.get('tokenize');
@@ -101,12 +100,13 @@ class Handlers:
         """A click on the speed curve: the part that it is in."""
         return self.cut(str(event.id), held)
 
-    def change(self, systems: Sequence[str], held: Session | None) -> tuple[Any, ...]:
-        """Other systems: the first one's tokens are taken apart, the rest stand beside it."""
-        session, (first, beside) = self._open(held), side_by_side(self.services, systems)
-        if first == (session.system or self.services.default_system().name):
-            return self._show(replace(session, beside=beside))
-        return self._show(session.forgetful(system=first, beside=beside))
+    def change(self, system: str, held: Session | None) -> tuple[Any, ...]:
+        """Another system."""
+        return self._show(self._open(held).forgetful(system=str(system)))
+
+    def join(self, systems: Sequence[str], held: Session | None) -> tuple[Any, ...]:
+        """Other systems beside it."""
+        return self._show(replace(self._open(held), beside=beside_it(self.services, systems)))
 
     def rebuild(self, used: float, kind: str, held: Session | None) -> tuple[Any, ...]:
         """The same tokens, another set of scales."""
@@ -139,7 +139,9 @@ class Handlers:
             source = Source(found.motion(), found.title)
             session = Session(found.id, source, caption=found.caption, upload=upload)
         session.caption = state.values.get("caption", session.caption)
-        session.system, session.beside = side_by_side(self.services, state["system"] or ())
+        shipped = {system.name for system in self.services.shipped("tokenizer")}
+        session.system = state.system if state.system in shipped else ""
+        session.beside = beside_it(self.services, state["beside"] or ())
         session.wish = state["code"] if isinstance(state["selection"], Token) else None
         shown = [*self._show(session, note, state), gr.skip()]
         if state["wrong"]:
@@ -165,8 +167,8 @@ class Handlers:
         count = view.controls["count"]
         steps = gr.update(maximum=max(2, count), value=view.controls["scales"], interactive=count > 1)
         session, stage, *rest = self._parts(held, view)
-        systems = [held.system or self.services.default_system().name, *held.beside]
-        told = (menu, held.caption, window, steps, view.controls["kind"], systems, *self._cuts(held))
+        systems = held.system or self.services.default_system().name, list(held.beside)
+        told = (menu, held.caption, window, steps, view.controls["kind"], *systems, *self._cuts(held))
         return session, Noted(stage, note), *rest, *told
 
     def _cuts(self, held: Session) -> tuple[Any, ...]:
@@ -190,7 +192,7 @@ def room(services: Services) -> None:
         stage = stage_and_score(NAME, opening)
         with panel("A motion becomes tokens, and comes back", LEAD, compare=True):
             with gr.Column(elem_classes=["mtp-view", "mtp-view-motion"], min_width=0):
-                example, system, upload, caption, go, ask, window, kind, scales = _controls(services, opening)
+                example, system, beside, upload, caption, go, ask, window, kind, scales = _controls(services, opening)
             message = message_place("tokenize-message")
             with gr.Column(elem_classes=["mtp-view", "mtp-view-motion"], min_width=0):
                 facts = gr.HTML(opening.facts_html(), elem_id="tokenize-facts", apply_default_css=False)
@@ -204,10 +206,11 @@ def room(services: Services) -> None:
     do = Handlers(services, opening)
     parts = [session, stage, facts, energy, views.card, views.told, views.swapped, views.misled]
     box, part, start, curve = window
-    everything = [*parts, example, caption, start, scales, kind, system, box, part, curve]
+    everything = [*parts, example, caption, start, scales, kind, system, beside, box, part, curve]
     busy: dict[str, Any] = {"message": message, "stage": NAME, "doing": DOING}
     attach(example.input, do.choose, [example, session], everything, **busy)
     attach(system.input, do.change, [system, session], everything, **busy)
+    attach(beside.input, do.join, [beside, session], everything, **busy)
     attach(upload.upload, do.bring, [upload, session], everything, **busy)
     for event in (caption.submit, go.click):
         attach(event, do.again, [caption, session], everything, **busy)
@@ -230,6 +233,7 @@ def room(services: Services) -> None:
     commits(NAME, {"start": start}, start.input, forget=own[1:])
     commits(NAME, {"part": part}, part.input, pointed.then, forget=("start", *own[2:]))
     commits(NAME, {"system": system}, system.input, forget=own[2:])
+    commits(NAME, {"beside": beside}, beside.input)
 
 
 def _controls(services: Services, opening: View) -> tuple[Any, ...]:
@@ -244,10 +248,16 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
         upload = gr.UploadButton(
             "Upload", file_count="single", size="sm", scale=0, min_width=84, elem_id="tokenize-upload"
         )
-    system = gr.Dropdown(
-        [(one.title, one.name) for one in shipped], value=[usual] if usual else [], multiselect=True,
-        max_choices=MOST + 1, label=SYSTEMS, elem_id="tokenize-system", visible=len(shipped) > 1,
-    )  # fmt: skip
+    with gr.Row(elem_classes=["mtp-line"], visible=len(shipped) > 1):
+        choices = [(one.title, one.name) for one in shipped]
+        system = gr.Dropdown(
+            choices, value=usual, scale=2, label=control(NAME, "system").label, elem_id="tokenize-system",
+            min_width=120,
+        )  # fmt: skip
+        beside = gr.Dropdown(
+            choices, value=[], scale=3, multiselect=True, max_choices=MOST, label=control(NAME, "beside").label,
+            elem_id="tokenize-beside", min_width=160,
+        )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-caption"]):
         caption = gr.Textbox(
             opening.controls.get("caption", ""), label=control(NAME, "caption").label,
@@ -266,7 +276,7 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
             1, max(count, 2), value=count, step=1, label=control(NAME, "scales").label, elem_id="tokenize-scales",
             scale=1, min_width=120,
         )  # fmt: skip
-    return example, system, upload, caption, go, ask, window, kind, scales
+    return example, system, beside, upload, caption, go, ask, window, kind, scales
 
 
 def _window() -> tuple[Any, ...]:
