@@ -102,10 +102,10 @@ def test_a_token_under_the_microscope_and_codes(page: Page, engine: Engine, name
     shown(page, "tokenize", f"track.system === '{name}' && whole")
     chosen = f"{{ selection: {{ system: '{name}', scale: {count}, position: 0 }} }}"
     page.evaluate(f"() => MotionStage.get('tokenize').store.commit('select', {chosen})")
-    card = page.locator("#tokenize-token .mtp-token")
+    card = page.locator("#tokenize-card .mtp-token")
     expect(card).to_contain_text(f"scale {count}, token 1 of")
     expect(card.locator(".mtp-governs")).to_contain_text(re.compile("measured", re.IGNORECASE))
-    page.get_by_role("button", name="Back to the motion").click()
+    card.get_by_role("button", name="Back to the motion").click()
     expect(card).to_have_count(0)
     follow(page, f"?room=codebooks&system={name}&code={name}.{count}.3")
     expect(page.locator("#codebooks-card")).to_contain_text(f"scale {count}")
@@ -134,7 +134,7 @@ def test_a_span_is_repainted(page: Page, name: str) -> None:
     choose(page, "edit", name)
     strength = page.locator("#edit-s input[type=range]")
     if not strength.is_visible():
-        page.get_by_role("tabpanel", name="Edit").get_by_role("button", name="More").click()
+        page.locator("#room-edit .mtp-knobs > button").first.click()  # "More"
     expect(strength).to_have_value(f"{SYSTEMS[name].sampling.cfg:g}")
     page.evaluate(REMEMBER, "edit")
     page.locator("#edit-go").click()
