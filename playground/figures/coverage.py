@@ -41,7 +41,7 @@ def usage_lines(
         ticks = list(range(1, shared + 1))
         figure.update_xaxes(title="scale, coarse to fine", tickvals=ticks, range=[0.6, shared + 0.4], ticks="")
     else:
-        figure.update_xaxes(title="scale, from the coarsest (0) to the finest (1)", range=[-0.04, 1.04], nticks=5)
+        figure.update_xaxes(title="scale, coarse (0) to fine (1)", range=[-0.04, 1.04], nticks=5)
     figure.update_yaxes(range=[0, 104], nticks=6)
     return finish(figure, caption=caption, height=height, heads=1)
 

@@ -35,7 +35,7 @@ _GENERATOR = GeneratorTraining(
 _DIFFUSION = FeatureTraining(
     model=DIFFUSION_PRESETS["lite"],
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=1_800, rate=1e-3, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=1_400, rate=1e-3, clip=1.0, fall=0.35),
 )
 
 TOKENIZERS: dict[str, TokenizerTraining] = {

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 os.environ.setdefault("GRADIO_ANALYTICS_ENABLED", "False")  # before gradio is imported: it reads this once
 
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is: threads that wait leave a shared core to others
+
 import gradio as gr
 
 from playground.limits import LIMITS

@@ -70,8 +70,9 @@ def arrival(
     room: str,
     **settings: Any,
 ) -> None:
-    """Bind what a room does when a link has asked for it. settings go to `errors.attach`."""
-    run = attach(door.arrive, handler, inputs, outputs, message, **settings)
+    """Bind what a room does when a link has asked for it; a link that comes while another one is shown waits for that.
+    settings go to `errors.attach`."""
+    run = attach(door.arrive, handler, inputs, outputs, message, trigger_mode="always_last", **settings)
     run.then(None, None, None, js=f"() => window.mtpState?.settled({json.dumps(room)})", api_visibility="private")
 
 

@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from playground.engine import Engine
 from playground.systems import SYSTEMS
+from playground.ui.state import parse
 from tests.browser.conftest import Visit, visiting
 from tests.browser.server import serving
 from tests.tiny_systems import TRAINED
@@ -61,8 +62,8 @@ def shown(page: Page, room: str, condition: str) -> Any:
 
 
 def follow(page: Page, address: str) -> None:
-    """Open an address inside the page, as a link does."""
-    page.evaluate("() => { window.mtpSeen = null; }")
+    """Open an address inside the page, as a link does; `shown` then waits for what it brings."""
+    page.evaluate(REMEMBER, parse(address).room.removesuffix("-map"))
     page.evaluate("(address) => window.mtpState.open(address)", address)
 
 
@@ -179,8 +180,8 @@ def test_two_systems_stand_side_by_side(page: Page, vary: str) -> None:
 
 def test_an_edit_goes_on_to_compare_with_its_system(page: Page) -> None:
     choose(page, "edit", "momaskpp")
+    page.evaluate(REMEMBER, "compare")
     page.locator("#room-edit [data-part=compare]").click()
-    page.evaluate("() => { window.mtpSeen = null; }")
     shown(page, "compare", "data.tracks.length === 1 && track.system === 'momaskpp' && data.figures.length === 4")
 
 

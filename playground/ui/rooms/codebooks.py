@@ -106,10 +106,22 @@ def facts(services: Services, wish: Wish) -> tuple[Fact, ...]:
     usage = bundle.usage
     dead = sum(len(codes) for codes in usage.dead_)
     return (
+        *_whose(services, wish),
         Fact(percent(usage.used_all_), f"of {sum(bundle.codes):,} codes used", term("codes used")),
         Fact(f"{dead:,}", "dead", term("dead code")),
         Fact(f"{int(usage.totals_.sum()):,}", "tokens counted"),
     )
+
+
+def _whose(services: Services, wish: Wish) -> tuple[Fact, ...]:
+    """Which of several systems the numbers are of, and which ones have no panels."""
+    if len(wish.systems) == 1:
+        return ()
+    bundles = [services.bundle(name) for name in wish.systems]
+    other = [row_of(one.system).title for one in bundles if len(one.sizes) != len(bundles[0].sizes)]
+    card = "The numbers beside this are of the first system chosen; the lines and the table show all."
+    card += f" Panels show as many scales as it has: none for {' and '.join(other)}." if other else ""
+    return (Fact(row_of(wish.systems[0]).title, "in numbers and panels", card),)
 
 
 def code_view(services: Services, system: str, scale: int, code: int) -> View:
