@@ -111,8 +111,9 @@ def open_source(
     system = services.system(held.system).name
     if name.startswith(MADE):
         made = made_again(services, name, caption or "", system)
-        own = made.system == system  # another system's motion is read as tokens first, as any other motion is
-        base = made if own else services.engine().tokenize(made.motion, made.prompt, system=system)
+        base: Tokenized | Generation = made
+        if made.system != system:  # another system's motion is read as tokens first, as any other motion is
+            base = services.engine().tokenize(made.motion, made.prompt, system=system)
         return replace(held, name=name, title=made.prompt or "A generated motion", caption=made.prompt, base=base)
     if name.startswith(OWN_FILE):
         if held.upload is None:

@@ -9,7 +9,7 @@ from playground.ui.bar import comparison
 from playground.ui.carry import CARRIES, compared_with
 from playground.ui.rooms.compare import Handlers, Held
 from playground.ui.services import Services
-from playground.ui.state import ROOMS, parse
+from playground.ui.state import ROOMS, parse, query
 from tests.ui.double import FakeEngine
 
 
@@ -89,3 +89,17 @@ def test_a_comparison_is_stopped_between_two_settings(services: Services) -> Non
     do.begin(held)
     assert len(list(do.compare(held, "seed", ["0", "1", "2"], "a person sits", 2.0, 0, None))) == 3
     assert [update["interactive"] for update in do.end()] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("address", "system"),
+    [("?room=edit&motion=m1&seed=1&system=momask", "momask"), ("?room=generate&prompt=a+b&system=momask", "momask"),
+     ("?room=guidance&motion=m1&system=lgtok-mid", "lgtok-mid"), ("?room=guidance&motion=m1&system=momask", None)],
+)  # fmt: skip
+def test_the_system_of_the_room_goes_on(address: str, system: str | None) -> None:
+    engine = FakeEngine(others=("momask", "lgtok-mid"))
+    services = Services(lambda: engine)  # type: ignore[arg-type, return-value]
+    state, held = compared_with(services, parse(address)), Held()
+    assert state.system == system
+    list(Handlers(services).arrive(held, SimpleNamespace(query=query(state))))  # type: ignore[arg-type]
+    assert {one.setting.system for one in held.done} == {system or "lgtok-lite"}

@@ -23,6 +23,7 @@ from playground.ui.drawing import (
     made_again,
     made_name,
     read_changes,
+    read_name,
     wish_values,
     write_changes,
 )
@@ -156,6 +157,17 @@ def test_a_made_motion_can_be_named_and_drawn_again(services: Services) -> None:
         assert parse(f"?room=tokenize&motion={name}")["motion"] == name
         again = made_again(services, name, "a person sits")
         assert all(np.array_equal(a.ids, b.ids) for a, b in zip(again.levels, made.takes[take].levels, strict=True))
+
+
+def test_the_name_of_a_made_motion_holds_its_system() -> None:
+    engine = FakeEngine(others=("momask",))
+    services = Services(lambda: engine)  # type: ignore[arg-type, return-value]
+    named = replace(wish(), system="momask")
+    name = made_name(named, 3, (Change(4, 1, 5),))
+    assert read_name(name, "a person sits") == (named, (Change(4, 1, 5),)) and "_momask_4.1.5" in name
+    assert made_again(services, name, "a person sits").system == "momask"
+    plain = made_name(wish(), 3)
+    assert [made_again(services, plain, "x", usual).system for usual in ("", "momask")] == ["lgtok-lite", "momask"]
 
 
 @pytest.mark.parametrize("name", ["made_", "made_1_2", "made_x_5_0_3_1_0.2_0.95", "walk", "made_1_5_0_3_1_0.2_0.95_z",

@@ -9,6 +9,8 @@ import pytest
 
 from playground.errors import PlaygroundError
 from playground.limits import LIMITS
+from playground.systems import SYSTEMS
+from playground.ui.bar import script
 from playground.ui.drawing import MADE
 from playground.ui.editing import (
     KINDS,
@@ -158,3 +160,51 @@ def test_a_long_file_shows_its_window_and_another_one_of_it(do: Handlers) -> Non
     again = do.arrive(moved[0], event(query="?room=edit&motion=file%3Along.bvh&start=5&from=1&to=2"))
     assert np.array_equal(again[0].base.motion.joints, session.base.motion.joints) and again[2] != ""
     assert not do.choose("m2", "inpaint", session)[8]["visible"]
+
+
+@pytest.fixture
+def several() -> Handlers:
+    engine = FakeEngine(others=("momask", "lgtok-rvq"), denoises=True)  # the second one has no generator
+    services = Services(lambda: engine)  # type: ignore[arg-type, return-value]
+    return Handlers(services, opening_view(services))
+
+
+def calls(do: Handlers) -> list[str]:
+    return do.services.engine().calls  # type: ignore[attr-defined, no-any-return]
+
+
+def test_another_system_reads_the_same_motion_and_brings_its_own_numbers(several: Handlers) -> None:
+    assert [one.name for one in several.services.editors()] == ["lgtok-lite", "momask"]
+    held = several.choose("m2", "inpaint", EditSession())[0]
+    shown = several.change("momask", "inpaint", held)
+    session, own = shown[0], SYSTEMS["momask"].sampling
+    assert session.name == "m2" and session.base.system == shown[11] == "momask" and session.caption == held.caption
+    assert shown[12:] == (own.guidance, own.cfg)
+    several.repaint(session, *ASKED.values())
+    assert calls(several)[-1] == "edit inpaint (20, 40) a person bows 3 momask"
+    assert several.choose("m1", "inpaint", session)[0].base.system == "momask"  # another motion, the same system
+
+
+def test_a_link_names_the_system_and_one_that_cannot_gives_way_with_a_sentence(several: Handlers) -> None:
+    shown = several.arrive(EditSession(), event(query="?room=edit&system=momask&motion=m1&seed=2"))
+    own = SYSTEMS["momask"].sampling
+    assert shown[11] == "momask" and calls(several)[-1].endswith("2 momask") and shown[15:17] == (own.guidance, own.cfg)
+    for name, title in (("lgtok-rvq", "LG-Tok with MoMask's quantizer"), ("mogo", "MOGO")):
+        other = several.arrive(EditSession(), event(query=f"?room=edit&system={name}&motion=m1"))
+        assert other[11] == "lgtok-lite" and other[1].text == f"{title} cannot edit here; this is LG-Tok lite."
+
+
+def test_the_last_generation_brings_its_system(several: Handlers) -> None:
+    shown = several.last("?room=generate&prompt=someone+jogs&system=momask", "inpaint", EditSession())
+    name = shown[6]
+    assert shown[0].base.system == shown[11] == "momask" and name.endswith("_momask") and shown[1].text == ""
+    assert shown[12:] == (SYSTEMS["momask"].sampling.guidance, SYSTEMS["momask"].sampling.cfg)
+    back = several.change("lgtok-lite", "inpaint", shown[0])
+    assert back[6] == name and back[0].base.system == "lgtok-lite" and calls(several)[-1] == "tokenize"
+    for system, source in (("momask", "made"), ("lgtok-lite", "made.motion")):
+        address = f"?room=edit&motion={name}&caption=someone+jogs&system={system}"
+        again = several.arrive(EditSession(), event(query=address))
+        assert again[0].base.system == system
+        code = script(several.services, [address])["code"]
+        assert 'system="momask",\n    seed=0' in code and f"engine.edit(\n    {source},\n" in code
+        assert ('system="lgtok-lite"' in code) == (system == "lgtok-lite")

@@ -177,20 +177,32 @@ def _told(text: str) -> str:
 def _controls(services: Services, opening: View) -> tuple[Any, ...]:
     """Motion, system, caption and its button: one line, two where there are several systems whose decoder reads words
     and the menu of them is seen."""
-    able, row = services.readers(), control(NAME, "system")
-    with gr.Row(elem_classes=["mtp-line"]) as line:
+    several = len(services.readers()) > 1
+    with gr.Row(elem_classes=["mtp-line"]):
         example = gr.Dropdown(
             services.example_choices(), value=opening.controls.get("example"), label="Motion",
             elem_id="guidance-example", scale=1, min_width=120,
         )  # fmt: skip
-        system = gr.Dropdown(
-            [(one.title, one.name) for one in able], value=able[0].name if able else None, label=row.label,
-            elem_id=row.element, visible=len(able) > 1, scale=1, min_width=120,
-        )  # fmt: skip
-    with gr.Row(elem_classes=["mtp-line"]) if len(able) > 1 else line:
-        caption = gr.Textbox(
-            opening.controls.get("caption", ""), label="Caption", max_lines=1, elem_id="guidance-caption", scale=1,
-            min_width=120,
-        )  # fmt: skip
-        go = gr.Button("Decode", variant="primary", size="sm", scale=0, min_width=72, elem_id="guidance-go")
-    return example, system, caption, go
+        beside = _menu(services) if several else _caption(opening)
+    with gr.Row(elem_classes=["mtp-line"], visible=several):
+        below = _caption(opening) if several else _menu(services)
+    return example, *((*beside, *below) if several else (*below, *beside))
+
+
+def _menu(services: Services) -> tuple[Any, ...]:
+    """The systems whose decoder reads words."""
+    able, row = services.readers(), control(NAME, "system")
+    choices = [(one.title, one.name) for one in able]
+    return (
+        gr.Dropdown(choices, value=able[0].name if able else None, label=row.label, elem_id=row.element, scale=1,
+                    min_width=120),
+    )  # fmt: skip
+
+
+def _caption(opening: View) -> tuple[Any, ...]:
+    """The caption and its button."""
+    return (
+        gr.Textbox(opening.controls.get("caption", ""), label="Caption", max_lines=1, elem_id="guidance-caption",
+                   scale=1, min_width=120),
+        gr.Button("Decode", variant="primary", size="sm", scale=0, min_width=72, elem_id="guidance-go"),
+    )  # fmt: skip
