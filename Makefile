@@ -21,6 +21,7 @@ SYSTEM_NAME ?= lgtok-lite
 LIBRARY ?= library
 RUNS ?= runs
 DATA ?= $(PLAYGROUND_DATA)
+DATA_NAME ?= motions-22
 SIZE ?= cpu
 MINUTES ?=
 THREADS ?= 2
@@ -57,7 +58,7 @@ figures: $(DEV) $(LIBRARY)/library.json ## make the stored results that are miss
 	$(BIN)/python -m playground.evaluation.published --library $(LIBRARY)
 
 $(LIBRARY)/library.json: | $(DEV)
-	$(BIN)/python -m playground prepare joints-npz $(DATA) --out $(LIBRARY)
+	$(BIN)/python -m playground prepare joints-npz $(DATA) --out $(LIBRARY) --name $(DATA_NAME)
 
 train: $(DEV) $(LIBRARY)/library.json ## train SYSTEM_NAME: its tokenizer, its generator, then a refit of the detokenizer; goes on where it stopped (DATA=folder makes LIBRARY)
 	$(BIN)/python -m playground train $(SYSTEM_NAME)-tokenizer --library $(LIBRARY) --out $(RUNS)/$(SYSTEM_NAME) --resume

@@ -171,6 +171,7 @@ def _for_data(command: Command) -> None:
     sub.add_argument("root", metavar="ROOT", nargs="?", type=Path, help="the folder of the data; none for deepmimic")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="the library to write")
     sub.add_argument("--cut", action="store_true", help="bvh: cut takes longer than 12 s at still moments")
+    sub.add_argument("--name", default="", metavar="NAME", help="what results call the data (default: the source)")
 
     sub = command("segment", inputs.segment, "where a long take is cut, with its speed curve")
     sub.add_argument("take", metavar="TAKE", type=Path, help="a .bvh, .npy or .npz file")

@@ -26,12 +26,12 @@ def rewrite(prompt: str, rules: bool, as_json: bool) -> None:
         say(f"  - {note}")
 
 
-def prepare(source: str, root: Path | None, out: Path, cut: bool) -> None:
+def prepare(source: str, root: Path | None, out: Path, cut: bool, name: str) -> None:
     """Published data to library."""
     from playground.data import sources
 
     with Progress(f"preparing {source}") as progress:
-        prepared = sources.prepare(source, root, out, progress, cut)
+        prepared = sources.prepare(source, root, out, progress, cut, name)
     for note in prepared.notes:
         say(note)
     say(f"{out}: {prepared.clips} clips")

@@ -64,7 +64,7 @@ CONTROLS: tuple[Control, ...] = (
     Control("room", "", "choice", "tokenize", "Room", choices=ROOMS),
     *_of_stage("tokenize", "tokenize"),
     Control("motion", "tokenize", "name", None, "Motion", element="tokenize-example"),
-    Control("beside", "tokenize", "systems", None, "Beside it", element="tokenize-beside"),
+    Control("beside", "tokenize", "systems", None, "Other systems beside it", element="tokenize-beside"),
     Control("start", "tokenize", "number", 0.0, "or 9.8 s from second", 0, 600,
             element="tokenize-start"),
     Control("part", "tokenize", "whole", 0, "Tokenize the part", 0, 999, element="tokenize-part"),

@@ -236,3 +236,15 @@ def test_takes_without_a_split_fall_80_5_15() -> None:
 def test_opening_reads_no_clip(tmp_path: Path) -> None:
     reading = open_source("joints-npz", joints_npz(tmp_path / "in"))
     assert reading.total == 3 and not reading.left_out
+
+
+def test_a_library_has_the_name_that_it_is_given(tmp_path):
+    root = joints_npz(tmp_path / "in")
+    prepare("joints-npz", root, tmp_path / "out", name="my-set.2")
+    assert Library.open(tmp_path / "out").name == "my-set.2"
+    prepare("joints-npz", root, tmp_path / "plain")
+    assert Library.open(tmp_path / "plain").name == "joints-npz"
+    for wrong in ("a b", "../x", "x" * 61, "-"):
+        with pytest.raises(PlaygroundError, match="letters, digits"):
+            prepare("joints-npz", root, tmp_path / "other", name=wrong)
+    assert not (tmp_path / "other").exists()

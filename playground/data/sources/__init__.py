@@ -1,5 +1,6 @@
 """Published motion data on disk -> one motion library: the readers by name, and `prepare`, which runs one of them."""
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,6 +17,8 @@ from playground.data.sources.kit_ml import read_kit_ml
 from playground.data.sources.motionx import read_motion_x
 from playground.data.sources.snapmogen import read_snapmogen
 from playground.errors import PlaygroundError
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,59}")  # of a library
 
 SOURCES: dict[str, SourceEntry] = {
     "joints-npz": SourceEntry(read_joints_npz, True, "a folder with motions.npz and clips.jsonl"),
@@ -71,12 +74,16 @@ def prepare(
     out: Path,
     progress: Callable[[int, int], None] | None = None,
     cut: bool = False,
+    name: str = "",
 ) -> Prepared:
     """Read a source and write it as a library to the folder `out`, which appears only when all of it is written.
 
-    progress: called with (clips done, clips expected). PlaygroundError as in `open_source`, for a broken file, for a
-    clip id that comes twice, and where `out` is something else than a library or an empty folder.
+    progress: called with (clips done, clips expected); name: what results call the data, the source where it is "".
+    PlaygroundError as in `open_source`, for a broken file, for a clip id that comes twice, for a name of other
+    characters, and where `out` is something else than a library or an empty folder.
     """
+    if name and not NAME.fullmatch(name):
+        raise PlaygroundError(f"the name {name[:60]!r} is not accepted; up to 60 letters, digits, - _ and . are")
     if out.exists() and not (out.is_dir() and ((out / "library.json").is_file() or not any(out.iterdir()))):
         raise PlaygroundError(f"{out} exists and is not a motion library; name a new or empty folder")
     reading = open_source(source, root, cut)
@@ -84,7 +91,7 @@ def prepare(
     partial = out.with_name(out.name + ".partial")
     shutil.rmtree(partial, ignore_errors=True)
     try:
-        count = write_library(partial, _unique(reading.clips), source, report)
+        count = write_library(partial, _unique(reading.clips), name or source, report)
         shutil.rmtree(out, ignore_errors=True)
         partial.replace(out)
     finally:

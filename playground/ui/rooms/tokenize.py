@@ -245,19 +245,17 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
             services.example_choices(), value=opening.controls.get("example"), label="Motion",
             elem_id="tokenize-example", scale=2, min_width=160,
         )  # fmt: skip
-        upload = gr.UploadButton(
-            "Upload", file_count="single", size="sm", scale=0, min_width=84, elem_id="tokenize-upload"
-        )
-    with gr.Row(elem_classes=["mtp-line"], visible=len(shipped) > 1):
-        choices = [(one.title, one.name) for one in shipped]
         system = gr.Dropdown(
-            choices, value=usual, scale=2, label=control(NAME, "system").label, elem_id="tokenize-system",
-            min_width=120,
+            [(one.title, one.name) for one in shipped], value=usual, scale=1, visible=len(shipped) > 1,
+            label=control(NAME, "system").label, elem_id="tokenize-system", min_width=120,
         )  # fmt: skip
-        beside = gr.Dropdown(
-            choices, value=[], scale=3, multiselect=True, max_choices=MOST, label=control(NAME, "beside").label,
-            elem_id="tokenize-beside", min_width=160,
-        )  # fmt: skip
+        upload = gr.UploadButton(
+            "Upload", file_count="single", size="sm", scale=0, min_width=72, elem_id="tokenize-upload"
+        )
+    beside = gr.Dropdown(
+        [(one.title, one.name) for one in shipped], value=[], multiselect=True, max_choices=MOST,
+        label=control(NAME, "beside").label, elem_id="tokenize-beside", visible=len(shipped) > 1,
+    )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-caption"]):
         caption = gr.Textbox(
             opening.controls.get("caption", ""), label=control(NAME, "caption").label,
