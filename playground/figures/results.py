@@ -34,14 +34,15 @@ def results_table(results: dict[str, Result]) -> Table:
 
 
 def measured(results: dict[str, Result]) -> str:
-    """What the table was measured on: data, split, clips and seed, and the number of repeats, in a sentence."""
-    lines = []
-    for facts in (result.provenance for result in results.values()):
-        lines.append(
+    """What the table was measured on: data, split, clips, repeats and seed; system by system where these differ."""
+    found: dict[str, list[str]] = {}
+    for name, facts in ((name, result.provenance) for name, result in results.items()):
+        line = (
             f"{facts['data']}, {facts['split']} split, {facts['n']} clips, {facts['repeats']} repeats (mean and 95 % "
             f"interval), seed {facts['seed']}, evaluator tmr {facts['evaluators']['tmr']}"
         )
-    return "; ".join(dict.fromkeys(lines))
+        found.setdefault(line, []).append(name)
+    return "; ".join(line if len(found) == 1 else f"{', '.join(names)}: {line}" for line, names in found.items())
 
 
 def _real(result: Result) -> tuple[str, ...]:

@@ -52,7 +52,9 @@ GENERATORS: dict[str, GeneratorTraining] = {
         tokenizer="mosa-tokenizer", schedule=replace(_GENERATOR.schedule, steps=1_200),  # 236 tokens a motion: slow
     ),
     "momask-generator": _GENERATOR,
-    "momask-lgtok-generator": replace(_GENERATOR, tokenizer="lgtok-rvq-tokenizer", lent=True),
+    "momask-lgtok-generator": replace(
+        _GENERATOR, tokenizer="lgtok-rvq-tokenizer", lent=True, schedule=replace(_GENERATOR.schedule, steps=1_200)
+    ),
     "momaskpp-generator": replace(_GENERATOR, model=_SCALES, tokenizer="momaskpp-tokenizer"),
     "momaskpp-cross-generator": replace(
         _GENERATOR, model=replace(_SCALES, variant="cross"), tokenizer="momaskpp-tokenizer", lent=True

@@ -33,6 +33,12 @@ def test_a_row_says_what_was_measured_and_a_dash_where_nothing_was() -> None:
     assert table.caption == "some, val split, 7 clips, 2 repeats (mean and 95 % interval), seed 3, evaluator tmr e"
 
 
+def test_what_differs_in_how_it_was_measured_is_said_by_name() -> None:
+    said = results_table({"momask": result(), "mogo": result(), "mosa": result(repeats=5)}).caption.split("; ")
+    assert [one.split(":")[0] for one in said] == ["momask, mogo", "mosa"]
+    assert "2 repeats" in said[0] and "5 repeats" in said[1]
+
+
 def test_a_system_without_tokens_has_dashes() -> None:
     facts = {"tokens": 0, "generator": None, "checkpoint": "abc"}
     assert results_table({"mdm": result(**facts)}).rows[1][:4] == ("`mdm`", "–", "4.30", "`abc`")
