@@ -10,7 +10,9 @@ from urllib.parse import urlparse
 import pytest
 from playwright.sync_api import expect
 
+from playground.analysis.bundle import read_bundle
 from playground.systems import checkpoint_path
+from playground.ui.services import SIDE_BY_SIDE
 from tests.browser.conftest import Visit
 from tests.browser.server import ROOT, serving
 
@@ -62,7 +64,20 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
 
     seen.enter("Codebooks")
     page.get_by_role("button", name="All numbers, scale by scale").click()
-    expect(page.locator("#codebooks-table tbody tr")).to_have_count(10)
+    counted = [name for name in SIDE_BY_SIDE if (ASSETS / "analysis" / f"{name}.json").is_file()]
+    scales = sum(len(read_bundle(ASSETS / "analysis", name).sizes) for name in counted)
+    expect(page.locator("#codebooks-table tbody tr")).to_have_count(scales)
+
+    seen.enter("Tokenize")
+    if "momask" in counted:
+        page.locator("#tokenize-beside input").click()
+        page.get_by_role("option", name="MoMask", exact=True).click()
+        expect(page.locator("#tokenize-stage .ms-labels")).to_contain_text("MoMask")
+        expect(page.locator("#tokenize-score .ms-heads")).to_contain_text("in 6 scales")
+        expect(page).to_have_url(re.compile("beside=momask"))
+
+    seen.enter("Compare")
+    expect(page.locator(".mtp-compared tbody tr")).to_have_count(3)
 
     seen.enter("Generate")
     seen.settle()
