@@ -109,8 +109,9 @@ class Services:
         return [system for system in self.shipped("tokenizer") if system.generator]
 
     def readers(self) -> list["SystemInfo"]:
-        """The shipped systems whose decoder reads words, which is where the guidance g acts."""
-        return [system for system in self.shipped("tokenizer") if self.engine().reads_words(system.name)]
+        """The shipped systems whose decoder reads words, which is where the guidance g acts; the usual one first."""
+        found = [system for system in self.shipped("tokenizer") if self.engine().reads_words(system.name)]
+        return sorted(found, key=lambda system: system.name != self.default_system().name) if found else []
 
     def first_few(self, known: Sequence[str]) -> list[str]:
         """Of the systems named those that a room shows side by side at first; the usual one where none of them is."""

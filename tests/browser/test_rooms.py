@@ -99,10 +99,11 @@ def test_a_bvh_file_can_be_uploaded(seen: Visit, tmp_path: Path) -> None:
     path = tmp_path / "mine.bvh"
     write_motion(corpus(1, seed=9)[0].motion, path)
     page = seen.page
-    was = figure_text(page, "tokenize")
+    was, told = figure_text(page, "tokenize"), facts(page, "tokenize").inner_text()
     page.locator("#tokenize-upload").locator("xpath=..").locator("input[type=file]").set_input_files(path)
     expect(page.locator("#tokenize-message")).to_contain_text("mine.bvh")
     expect(page.locator("#tokenize-stage .ms-labels")).not_to_have_text(was)
+    expect(facts(page, "tokenize")).not_to_have_text(told, use_inner_text=True)
     own = facts(page, "tokenize").inner_text()
     choose(page, "tokenize-example", 2)
     expect(facts(page, "tokenize")).not_to_have_text(own)
