@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 os.environ.setdefault("GRADIO_ANALYTICS_ENABLED", "False")  # before gradio is imported: it reads this once
-
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is: threads that wait leave a shared core to others
+# Before torch is imported: threads that wait for each other soon sleep, and leave a shared core to others.
+os.environ.setdefault("GOMP_SPINCOUNT", "20000")
 
 import gradio as gr
 
