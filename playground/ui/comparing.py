@@ -76,7 +76,8 @@ def _scales(services: Services) -> list[tuple[str, str]]:
 
 def _systems(drawing: bool) -> Choices:
     def shipped(services: Services) -> list[tuple[str, str]]:
-        return [(one.title, one.name) for one in services.shipped("generator" if drawing else "tokenizer")]
+        able = services.shipped("generator" if drawing else "tokenizer")
+        return [(one.title, one.name) for one in able if drawing or not row_of(one.name).lends]  # no tokenizer twice
 
     return shipped
 
