@@ -111,7 +111,8 @@ class Services:
     def readers(self) -> list["SystemInfo"]:
         """The shipped systems whose decoder reads words, which is where the guidance g acts; the usual one first."""
         found = [system for system in self.shipped("tokenizer") if self.engine().reads_words(system.name)]
-        return sorted(found, key=lambda system: system.name != self.default_system().name) if found else []
+        usual = self.default_system().name if found else ""
+        return sorted(found, key=lambda system: system.name != usual)
 
     def first_few(self, known: Sequence[str]) -> list[str]:
         """Of the systems named those that a room shows side by side at first; the usual one where none of them is."""
