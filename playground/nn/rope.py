@@ -15,9 +15,5 @@ def rope_angles(positions: Tensor, head_width: int, base: float) -> Rotation:
 
 def apply_rope(x: Tensor, rotation: Rotation) -> Tensor:
     """Rotate x [B, H, T, head width] by angles [T, head width / 2] or [B, 1, T, head width / 2]."""
-    if x.dtype == torch.float32:  # pairs as complex numbers: one multiplication instead of four
-        pairs = torch.view_as_complex(x.unflatten(-1, (-1, 2)))
-        return torch.view_as_real(pairs * torch.complex(*rotation)).flatten(-2)
-    cos, sin = (part.to(x.dtype) for part in rotation)
-    even, odd = x[..., 0::2], x[..., 1::2]
-    return torch.stack([even * cos - odd * sin, even * sin + odd * cos], dim=-1).flatten(-2)
+    pairs = torch.view_as_complex(x.float().unflatten(-1, (-1, 2)))  # one multiplication instead of four
+    return torch.view_as_real(pairs * torch.complex(*rotation)).flatten(-2).to(x.dtype)

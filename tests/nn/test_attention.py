@@ -3,7 +3,15 @@ import math
 import pytest
 import torch
 
-from playground.nn.attention import CrossAttention, KeyValueCache, Memory, SelfAttention, prefix_pattern, split_heads
+from playground.nn.attention import (
+    CrossAttention,
+    KeyValueCache,
+    Memory,
+    SelfAttention,
+    attend,
+    prefix_pattern,
+    split_heads,
+)
 from playground.nn.rope import rope_angles
 
 
@@ -117,3 +125,37 @@ def test_self_attention_records_the_weights_of_a_pattern():
     again = layer.out((record[0] @ value).transpose(1, 2).flatten(-2))
     torch.testing.assert_close(again, out, atol=1e-6, rtol=1e-5)
     assert not record[0].masked_select(~pattern.expand(-1, 2, -1, -1)).any()
+
+
+@pytest.mark.parametrize("kind", ["none", "keys", "pattern", "scores"])
+def test_attention_trained_in_half_precision_equals_that_in_full(kind):
+    torch.manual_seed(4)
+    mask = {
+        "none": None,
+        "keys": torch.rand(3, 7) > 0.4,
+        "pattern": torch.rand(3, 1, 5, 7) > 0.4,
+        "scores": torch.randn(3, 2, 5, 7),
+    }[kind]
+    if mask is not None and mask.dtype == torch.bool:
+        mask[..., 0] = True
+    full = [torch.randn(3, 2, size, 8).bfloat16().float().requires_grad_() for size in (5, 7, 7)]
+    half = [x.detach().bfloat16().requires_grad_() for x in full]
+    expected = attend(*full, mask, 0.0)
+    out = attend(*half, mask.bfloat16() if kind == "scores" else mask, 0.0)
+    assert out.dtype == torch.bfloat16
+    torch.testing.assert_close(out.float(), expected, atol=0.02, rtol=0.02)
+    direction = torch.randn_like(expected)
+    expected.backward(direction)
+    out.backward(direction.bfloat16())
+    for slow, fast in zip(full, half, strict=True):
+        torch.testing.assert_close(fast.grad.float(), slow.grad, atol=0.05, rtol=0.05)
+
+
+def test_attention_trained_in_half_precision_drops_weights_and_stays_finite_where_nothing_is_seen():
+    torch.manual_seed(5)
+    query, key, value = (torch.ones(1, 1, 4, 8, dtype=torch.bfloat16, requires_grad=True) for _ in range(3))
+    dropped = attend(query, key, value, None, 0.5)
+    assert len(dropped.unique()) > 1  # each of the four equal weights is 0 or doubled
+    unseen = attend(query, key, value, torch.zeros(1, 4, dtype=torch.bool), 0.0)
+    unseen.sum().backward()
+    assert unseen.isfinite().all() and query.grad.isfinite().all()
