@@ -70,7 +70,7 @@ def _listed(*values: str) -> Choices:
 
 
 def _scales(services: Services) -> list[tuple[str, str]]:
-    count = len(services.scales(services.default_system().name))
+    count = len(services.scales(services.default_system().name)) if services.shipped() else 0
     return [(str(n), str(n)) for n in range(1, count + 1)]
 
 

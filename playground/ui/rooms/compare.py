@@ -11,7 +11,6 @@ from playground.limits import LIMITS
 from playground.motion.motion import Motion
 from playground.ui.compared import compared_view
 from playground.ui.comparing import (
-    ALONE,
     EDIT,
     MOTION,
     PROMPT,
@@ -210,11 +209,11 @@ def _wire(
 def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[Any], list[Any]]:
     """The controls by their keys, the rows for a prompt and for a motion, "Compare" and "Stop"."""
     found: dict[str, Any] = {}
-    first = first_or_alone(services)
-    variation, picked = VARIATIONS[first], [name for _, name in chosen_or_none(services)]
+    first = first_variation(services)
+    variation, picked = VARIATIONS[first], [name for _, name in chosen(services, first, ())]
     with gr.Row(elem_classes=["mtp-line"]):
         found["vary"] = gr.Dropdown(
-            offered_or_none(services), value=first, label=control(NAME, "vary").label, elem_id="compare-vary", scale=1,
+            offered(services), value=first, label=control(NAME, "vary").label, elem_id="compare-vary", scale=1,
             min_width=160,
         )  # fmt: skip
         go = gr.Button("Compare", variant="primary", size="sm", scale=0, min_width=84, elem_id="compare-go")
@@ -244,27 +243,3 @@ def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[A
 
 def _choose(vary: str) -> str:
     return f"{VARIATIONS[vary].title}: choose 2 to {VARIATIONS[vary].most}"
-
-
-def chosen_or_none(services: Services) -> list[tuple[str, str]]:
-    """The choices of the first variation; none where no system is shipped."""
-    try:
-        return chosen(services, first_variation(services), ())
-    except PlaygroundError:
-        return []
-
-
-def first_or_alone(services: Services) -> str:
-    """What differs at first, also where no system is shipped."""
-    try:
-        return first_variation(services)
-    except PlaygroundError:
-        return ALONE
-
-
-def offered_or_none(services: Services) -> list[tuple[str, str]]:
-    """What may differ; none where no system is shipped."""
-    try:
-        return offered(services)
-    except PlaygroundError:
-        return []
