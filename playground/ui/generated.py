@@ -99,7 +99,7 @@ def _view(
         track["name"] = f"{track['name']}, {names[take][:1].lower()}{names[take][1:]}"
     return View(
         stage=scene.payload(figures, tracks, scene=f"{wish.prompt}, {wish.seconds}"),
-        facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)) if sizes else (Fact("0", "tokens", NO_TOKENS),),
+        facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)) if sizes else (Fact("no", "tokens", NO_TOKENS),),
         controls={"prompt": wish.prompt or "", "level": level, "count": count, "unit": unit},
         seconds=seconds,
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import gradio as gr
 import numpy as np
 import pytest
 
@@ -12,8 +13,17 @@ from playground.limits import LIMITS
 from playground.motion.measures import mpjpe
 from playground.systems import SystemInfo
 from playground.ui.compared import COLUMNS, ERROR, best_of, compared_view
-from playground.ui.comparing import PROMPT, VARIATIONS, Compared, chosen, offered, run, settings_of
-from playground.ui.rooms.compare import Handlers, Held, compare, opening_view
+from playground.ui.comparing import (
+    PROMPT,
+    VARIATIONS,
+    Compared,
+    chosen,
+    first_variation,
+    offered,
+    run,
+    settings_of,
+)
+from playground.ui.rooms.compare import Handlers, Held, compare, opening_view, room
 from playground.ui.services import Services
 from playground.ui.state import DIFFERENCES, parse
 from tests.ui.double import FakeEngine, motions
@@ -52,6 +62,21 @@ def test_systems_are_offered_as_soon_as_there_are_two(services: Services) -> Non
     assert [one.system for one in settings] == ["lgtok-lite", "lgtok"]
     view = compared_view(two, list(run(two, settings, motions()[0]))[-1], motions()[0], "a walk", 0)
     assert [track["system"] for track in view.stage["tracks"]] == ["lgtok-lite", "lgtok"]
+
+
+def test_a_copy_without_any_system_has_an_empty_room_and_no_error() -> None:
+    class NoSystem(FakeEngine):
+        def systems(self) -> list[SystemInfo]:
+            return [replace(one, checkpoint="absent") for one in super().systems()]
+
+    engine = NoSystem()
+    none = Services(lambda: engine)  # type: ignore[arg-type, return-value]
+    first = first_variation(none)
+    assert first == "scales" and chosen(none, first, ()) == []
+    with pytest.raises(PlaygroundError, match="no trained system is shipped"):
+        opening_view(none)
+    with gr.Blocks():
+        room(none)
 
 
 @pytest.mark.parametrize("vary", [key for key in VARIATIONS if key not in ("system", "maker")])
