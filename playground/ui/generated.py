@@ -88,8 +88,9 @@ def _view(
         id = f"made{n or ''}"
         figures.append(scene.figure(id, name, one.motion.joints, system.name, told, ghost_of=ghost))
     marks = [new.ids != old.ids for new, old in zip(shown.levels, before.levels, strict=False)] if before else None
-    tracks = []
+    tracks, facts = [], (Fact("no", "tokens", NO_TOKENS),)
     if sizes:  # a system without a tokenizer has no score
+        facts = (*token_facts(shown.levels), entropy_fact(shown.entropy))
         palettes = services.palettes(system.name)
         tracks.append(
             score(system, shown.motion.frames, shown.levels, palettes, shown.entropy, sizes, None, marks, CHANGED)
@@ -99,7 +100,7 @@ def _view(
         track["name"] = f"{track['name']}, {names[take][:1].lower()}{names[take][1:]}"
     return View(
         stage=scene.payload(figures, tracks, scene=f"{wish.prompt}, {wish.seconds}"),
-        facts=(*token_facts(shown.levels), entropy_fact(shown.entropy)) if sizes else (Fact("no", "tokens", NO_TOKENS),),
+        facts=facts,
         controls={"prompt": wish.prompt or "", "level": level, "count": count, "unit": unit},
         seconds=seconds,
     )
