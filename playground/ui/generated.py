@@ -88,7 +88,8 @@ def _view(
         id = f"made{n or ''}"
         figures.append(scene.figure(id, name, one.motion.joints, system.name, told, ghost_of=ghost))
     marks = [new.ids != old.ids for new, old in zip(shown.levels, before.levels, strict=False)] if before else None
-    tracks, facts = [], (Fact("no", "tokens", NO_TOKENS),)
+    tracks = []
+    facts: tuple[Fact, ...] = (Fact("no", "tokens", NO_TOKENS),)
     if sizes:  # a system without a tokenizer has no score
         facts = (*token_facts(shown.levels), entropy_fact(shown.entropy))
         palettes = services.palettes(system.name)
