@@ -16,8 +16,8 @@ from typing import NoReturn
 from playground import commands, inputs
 from playground.data.library import SPLITS
 from playground.errors import PlaygroundError
+from playground.systems import DEFAULT_SYSTEM
 
-DEFAULT_SYSTEM = "lgtok-lite"
 SOURCES = "joints-npz, humanml3d, kit-ml, motion-x, snapmogen, cmp, bvh or deepmimic"
 MOTION_FILES = (".npz", ".bvh", ".glb")
 BAD_INPUT, STOPPED = 2, 130

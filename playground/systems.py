@@ -110,6 +110,8 @@ _MASKED_SCALES = replace(_MASKED, cfg=5.0)  # E4, HumanML3D
 _CAUSAL = SamplingDefaults(guidance=0.0, cfg=2.0)  # the papers guide neither; ours
 _DENOISED = SamplingDefaults(guidance=0.0, cfg=2.5)  # D4
 
+DEFAULT_SYSTEM = "lgtok-lite"  # where none is named: of the family the one that measures best
+
 SYSTEMS: dict[str, SystemRow] = {
     row.name: row
     for row in (

@@ -22,7 +22,16 @@ from playground.motion.measures import mpjpe
 from playground.motion.motion import Motion
 from playground.motion.representation import from_features67
 from playground.results import Decoded, Example, Generation, GenerationStep, GuidancePair, Tokenized
-from playground.systems import SYSTEMS, SystemInfo, check_here, checkpoint_path, describe, header, row_of
+from playground.systems import (
+    DEFAULT_SYSTEM,
+    SYSTEMS,
+    SystemInfo,
+    check_here,
+    checkpoint_path,
+    describe,
+    header,
+    row_of,
+)
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens, TokenFile
 
@@ -92,7 +101,7 @@ class BaseEngine:
 
     # ---- motion to tokens and back --------------------------------------------------------------------------------
 
-    def tokenize(self, motion: Motion, caption: str = "", system: str = "lgtok-lite") -> Tokenized:
+    def tokenize(self, motion: Motion, caption: str = "", system: str = DEFAULT_SYSTEM) -> Tokenized:
         """The tokens of a motion, guided by its caption ("" for no text).
 
         Takes the first 196 rows; the rest is left out, choose another window with `Motion.slice`.
@@ -164,7 +173,7 @@ class BaseEngine:
         self,
         prompt: str | None,
         seconds: float,
-        system: str = "lgtok-lite",
+        system: str = DEFAULT_SYSTEM,
         seed: int = 0,
         guidance: float | None = None,
         cfg: float | None = None,
@@ -186,7 +195,7 @@ class BaseEngine:
         yield from (step for (step,) in steps)
 
     def generate(
-        self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, **options: Any
+        self, prompt: str | None, seconds: float, system: str = DEFAULT_SYSTEM, seed: int = 0, **options: Any
     ) -> Generation:
         """The finished motion; arguments as in `generate_steps`. The same seed gives the same tokens."""
         return self.generate_many(prompt, seconds, system, (seed,), **options)[0]
@@ -195,7 +204,7 @@ class BaseEngine:
         self,
         prompt: str | None,
         seconds: float,
-        system: str = "lgtok-lite",
+        system: str = DEFAULT_SYSTEM,
         seeds: Sequence[int] = (0, 1, 2, 3),
         deadline: float | None = LIMITS.deadline_seconds,
         previews: bool = True,
@@ -213,7 +222,7 @@ class BaseEngine:
         self,
         prompt: str | None,
         seconds: float,
-        system: str = "lgtok-lite",
+        system: str = DEFAULT_SYSTEM,
         seeds: Sequence[int] = (0, 1, 2, 3),
         **options: Any,
     ) -> list[Generation]:

@@ -40,7 +40,7 @@ from playground.limits import LIMITS
 from playground.motion.motion import Motion
 from playground.results import Decoded, Generation, GenerationStep, Tokenized
 from playground.stored import StoredAnalysis
-from playground.systems import row_of
+from playground.systems import DEFAULT_SYSTEM, row_of
 from playground.text.prompts import normalise
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ class Engine(BaseEngine):
         prompt: str | None,
         seed: int = 0,
         kind: str = "inpaint",
-        system: str = "lgtok-lite",
+        system: str = DEFAULT_SYSTEM,
         caption: str | None = None,
         anchor: str = "place",
         measured: bool = False,

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from playground.errors import PlaygroundError
 from playground.evaluation import judges
 from playground.evaluation.judges import THRESHOLDS, Judge, judge_motion
+from playground.systems import DEFAULT_SYSTEM
 
 Array = NDArray[np.floating]
 
@@ -106,7 +107,7 @@ def judge_all(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line: judge a system of the engine, write the report as JSON. Exit status 2 and one line on bad input."""
     parser = argparse.ArgumentParser(prog="python -m playground.evaluation.prompts_obeyed", description=__doc__)
-    parser.add_argument("--system", default="lgtok-lite", help="name of a system, see `python -m playground systems`")
+    parser.add_argument("--system", default=DEFAULT_SYSTEM, help="name of a system, see `python -m playground systems`")
     parser.add_argument("--json", type=Path, required=True, help="where the report goes")
     parser.add_argument("--seeds", type=int, default=3, help="seeds 0, 1, ... a prompt")
     options = parser.parse_args(arguments)

@@ -33,7 +33,7 @@ _CPU_GENERATOR = GeneratorTraining(  # 1.6 M
     model=replace(GENERATOR_PRESETS["lite"], width=128, depth=5, heads=2, hidden=256),
     tokenizer="lgtok-tokenizer",
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
-    schedule=Schedule(steps=1_200, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
+    schedule=Schedule(steps=2_000, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
     keep=0.8,
 )
 # 13.2 M and 6.4 M: 39 MB together, close to the largest that a flagship may have.

@@ -12,7 +12,7 @@ from playground.errors import PlaygroundError
 from playground.limits import LIMITS
 from playground.motion.measures import foot_sliding, mpjpe
 from playground.motion.motion import Motion
-from playground.systems import SystemInfo, row_of
+from playground.systems import DEFAULT_SYSTEM, SystemInfo, row_of
 from playground.text.prompts import normalise
 from playground.tokenizers.token_file import LevelTokens
 from playground.ui.facts import bits
@@ -27,7 +27,7 @@ EDIT_TITLES = {  # kind of edit -> its name
     "inbetween": "In-between",
 }  # fmt: skip
 ALONE = "scales"  # what differs where there is one system only
-DRAWN = ("lgtok-lite", "momask", "t2mgpt-casim")  # from a prompt
+DRAWN = (DEFAULT_SYSTEM, "momask", "t2mgpt-casim")  # from a prompt
 Choices = Callable[[Services], Sequence[tuple[str, str]]]
 
 

@@ -13,7 +13,7 @@ from playground.analysis.bundle import Bundle, read_bundle
 from playground.errors import PlaygroundError
 from playground.figures.stage import code_colors, message
 from playground.motion.motion import Motion
-from playground.systems import SamplingDefaults, checkpoint_path, header, row_of
+from playground.systems import DEFAULT_SYSTEM, SamplingDefaults, checkpoint_path, header, row_of
 from playground.ui.facts import as_sentence
 from playground.ui.view import View, read_view
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from playground.engine import Engine, Example, SystemInfo
 
 EngineSource = Callable[[], "Engine"]
-SIDE_BY_SIDE = ("lgtok-lite", "momask", "mogo")  # systems that rooms show first: three, so that a screen stays calm
+SIDE_BY_SIDE = (DEFAULT_SYSTEM, "momask", "mogo")  # systems that rooms show first: three, so that a screen stays calm
 KIND_WORDS = {"synthetic": "synthetic", "generated": "generated here", "decoded clip": "recorded, kept as tokens"}
 
 
@@ -159,8 +159,12 @@ class Services:
         raise PlaygroundError(f"the system {name} is not shipped with this copy; choose another one")
 
     def default_system(self) -> "SystemInfo":
-        """The first shipped system that tokenizes and generates, or else the first one; PlaygroundError if none is."""
+        """The usual system where it is here, else the first that tokenizes and generates, or else the first one.
+
+        PlaygroundError if none is shipped.
+        """
         shipped = self.shipped()
         if not shipped:
             raise PlaygroundError("no trained system is shipped with this copy; train one with: make train")
-        return next((system for system in shipped if system.generator and system.tokenizer), shipped[0])
+        able = [system for system in shipped if system.generator and system.tokenizer]
+        return next((system for system in able if system.name == DEFAULT_SYSTEM), (able or shipped)[0])

@@ -18,10 +18,12 @@ def with_systems(*systems: SystemInfo) -> Services:
     return Services(lambda: engine)  # type: ignore[arg-type, return-value]
 
 
-def test_rooms_show_the_first_shipped_system_that_generates():
+def test_rooms_show_the_usual_system_or_the_first_shipped_one_that_generates():
     absent = replace(LITE, name="lgtok", checkpoint="absent")
     silent = replace(LITE, name="lgtok-rvq", generator=None, sampling=SamplingDefaults(guidance=1.0))
     assert with_systems(absent, silent, LITE).default_system().name == "lgtok-lite"
+    assert with_systems(replace(LITE, name="mosa"), silent, LITE).default_system().name == "lgtok-lite"
+    assert with_systems(silent, replace(LITE, name="mosa")).default_system().name == "mosa"
     assert with_systems(absent, silent).default_system().name == "lgtok-rvq"
     assert with_systems(absent, silent).sampling().guidance == 1.0
     with pytest.raises(PlaygroundError, match="no trained system"):
