@@ -9,7 +9,7 @@ from playground.analysis.residual import ScaleEnergy
 from playground.figures.residual import residual_bars
 from playground.ui.facts import significant
 
-HEIGHT = 118
+HEIGHT = 104
 LABELS = {
     "upto": "% of energy missing, and MPJPE in mm, after scales 1 to n",
     "only": "% of energy missing after scales 1 to n; MPJPE in mm of n alone",

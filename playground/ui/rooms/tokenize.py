@@ -190,7 +190,7 @@ def room(services: Services) -> None:
     session = gr.State(Session(), time_to_live=LIMITS.session_seconds)
     with room_frame(NAME):
         stage = stage_and_score(NAME, opening)
-        with panel("A motion becomes tokens, and comes back", LEAD, compare=True):
+        with panel("A motion to tokens and back", LEAD, compare=True):
             with gr.Column(elem_classes=["mtp-view", "mtp-view-motion"], min_width=0):
                 example, system, beside, upload, caption, go, ask, window, kind, scales = _controls(services, opening)
             message = message_place("tokenize-message")
