@@ -42,7 +42,7 @@ WIDTH = 96  # of the convolutions
 REPEATS = 3
 HELD_OUT = "HDM05"  # the source that the held-out rows have not seen
 SIZES = ("small", "middle", "large")  # of Fig 5: width, feed-forward, layers, heads
-_SHAPES = {"small": (96, 256, 3, 3), "middle": (192, 512, 5, 3), "large": (320, 1024, 8, 5)}
+_SHAPES = {"small": (96, 256, 3, 3), "middle": (192, 512, 5, 3), "large": (256, 768, 6, 4)}
 
 
 MOGO, SNAP = "mogo-base", "snap-base"
