@@ -34,7 +34,6 @@ _CPU_GENERATOR = GeneratorTraining(  # 1.6 M
     tokenizer="lgtok-tokenizer",
     batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
     schedule=Schedule(steps=2_000, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
-    synthetic=0.4,  # plain prompts; with 0.1 raised hands waver
     keep=0.8,
 )
 # 13.2 M and 6.4 M: 39 MB together, close to the largest that a flagship may have.
