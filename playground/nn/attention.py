@@ -65,31 +65,28 @@ def attend(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, dropo
 
     mask: see above; a pattern of real numbers is added to the scaled scores.
     """
-    if mask is not None and mask.ndim == 2:  # keys [B, S]; a pattern comes as [1 or B, 1, T, S]
-        mask = mask[:, None, None, :]
     if query.device.type == "cpu" and query.dtype == torch.bfloat16 and query.requires_grad:
-        out = _attend_step_by_step(query, key, value, mask, dropout)
+        # torch's fused kernel takes 2 to 8 times as long backwards in bfloat16 on a CPU
+        out = F.dropout(attention_weights(query, key, mask), dropout) @ value
     else:
-        out = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=dropout)
+        out = F.scaled_dot_product_attention(query, key, value, attn_mask=_over_scores(mask), dropout_p=dropout)
     return out.transpose(1, 2).flatten(-2)
-
-
-def _attend_step_by_step(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, dropout: float) -> Tensor:
-    """The same without torch's fused kernel, whose backward pass in bfloat16 takes 2 to 8 times as long on a CPU."""
-    score = (query * query.shape[-1] ** -0.5) @ key.transpose(-2, -1)
-    if mask is not None and mask.dtype == torch.bool:
-        score = score.masked_fill(~mask, torch.finfo(score.dtype).min)
-    elif mask is not None:
-        score = score + mask
-    return F.dropout(score.softmax(dim=-1), dropout) @ value
 
 
 def attention_weights(query: Tensor, key: Tensor, mask: Tensor | None) -> Tensor:
     """What `attend` multiplies the values with: [B, H, T, head width] twice, its mask -> [B, H, T, S]."""
-    score = query @ key.transpose(-2, -1) / query.shape[-1] ** 0.5
-    if mask is not None:
-        score = score.masked_fill(~(mask if mask.ndim == 4 else mask[:, None, None, :]), float("-inf"))
+    score = (query * query.shape[-1] ** -0.5) @ key.transpose(-2, -1)
+    over = _over_scores(mask)
+    if over is not None and over.dtype == torch.bool:
+        score = score.masked_fill(~over, torch.finfo(score.dtype).min)
+    elif over is not None:
+        score = score + over
     return score.softmax(dim=-1)
+
+
+def _over_scores(mask: Tensor | None) -> Tensor | None:
+    """A mask as it lies over scores [B, H, T, S]: keys [B, S] get the axes that a pattern has."""
+    return mask[:, None, None, :] if mask is not None and mask.ndim == 2 else mask
 
 
 def prefix_pattern(real: Tensor, steps: int, *, causal_prefix: bool = False) -> Tensor:

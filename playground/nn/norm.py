@@ -11,7 +11,7 @@ class RMSNorm(nn.RMSNorm):
 
     def forward(self, x: Tensor) -> Tensor:
         """x [..., D] -> the same shape and dtype."""
-        if x.dtype != torch.bfloat16 or x.device.type != "cpu" or self.weight.dtype == x.dtype:
+        if x.dtype != torch.bfloat16 or x.device.type != "cpu":
             return super().forward(x)
         length = torch.linalg.vector_norm(x, dim=-1, keepdim=True, dtype=torch.float32)
         scale = (length.square() / x.shape[-1] + (self.eps or 0.0)).rsqrt()

@@ -68,7 +68,7 @@ def test_a_system_without_tokens_shows_the_map_alone(visit: Go, with_denoiser: s
     page = visit(f"{with_denoiser}?room=generate&system={DENOISER}&prompt=a+person+bows&seconds=2&words=1").page
     page.wait_for_function(HAS, arg=1)
     assert page.evaluate(STRIP)[0][0] == "Which words the denoiser looks at"
-    expect(page.locator("#generate-facts")).to_contain_text("no")
+    expect(page.locator("#generate-facts")).to_contain_text("no tokens")
     page.get_by_role("button", name="Sampling and guidance").click()
     expect(page.locator("#generate-s input[type=number]")).to_have_value("2.5")  # its own guidance
     page.locator("#generate-system input").click()

@@ -219,7 +219,7 @@ def _controls(services: Services, opening: View) -> tuple[dict[str, Any], list[A
         go = gr.Button("Compare", variant="primary", size="sm", scale=0, min_width=84, elem_id="compare-go")
         cancel = gr.Button("Stop", size="sm", scale=0, min_width=60, interactive=False, elem_id="compare-stop")
     found["values"] = gr.CheckboxGroup(
-        list(variation.choices(services)) if picked else [], value=picked, elem_id="compare-values",
+        list(variation.choices(services)), value=picked, elem_id="compare-values",
         label=_choose(first),
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line"], visible=variation.of == PROMPT) as of_prompt:
