@@ -196,7 +196,7 @@ def _for_data(command: Command) -> None:
 def _for_training(command: Command) -> None:
     """train, evaluate, bench."""
     sub = command("train", commands.train, "train a tokenizer, a generator, a refit, an evaluator or the root refiner")
-    sub.add_argument("config", metavar="CONFIG", help="a named run, such as lgtok-lite-tokenizer or tmr-evaluator")
+    sub.add_argument("config", metavar="CONFIG", help="a named run, such as lgtok-tokenizer or tmr-evaluator")
     sub.add_argument("--library", type=Path, required=True, metavar="DIR")
     sub.add_argument("--out", type=_new_folder, required=True, metavar="DIR", help="checkpoints and logs")
     sub.add_argument("--resume", action="store_true", help="go on from the last checkpoint in --out, if there is one")

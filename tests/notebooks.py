@@ -8,7 +8,7 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parent.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
-SYSTEM = "lgtok-lite"
+SYSTEM = "lgtok"
 needs_checkpoint = pytest.mark.skipif(
     not (ROOT / "assets" / "checkpoints" / SYSTEM / "generator.safetensors").is_file(),
     reason="no checkpoint is shipped",

@@ -93,24 +93,24 @@ BAD_CALLS = {
     "prepare into a file": ["prepare", "joints-npz", ".", "--out", "clip.npz"],
     "prepare without out": ["prepare", "joints-npz", "."],
     "an unknown training": ["train", "everything", "--library", "lib", "--out", "run"],
-    "train on no library": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run"],
-    "train without a library": ["train", "lgtok-lite-tokenizer", "--out", "run"],
-    "train for no steps": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--steps", "many"],
-    "train on no devices": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--devices", "0"],
-    "train for no time": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--minutes", "0"],
+    "train on no library": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run"],
+    "train without a library": ["train", "lgtok-tokenizer", "--out", "run"],
+    "train for no steps": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run", "--steps", "many"],
+    "train on no devices": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run", "--devices", "0"],
+    "train for no time": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run", "--minutes", "0"],
     "train another size": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run", "--size", "huge"],
-    "train with odd precision": ["train", "lgtok-lite-tokenizer", "--library", ".", "--out", "run", "--precision", "8"],
+    "train with odd precision": ["train", "lgtok-tokenizer", "--library", ".", "--out", "run", "--precision", "8"],
     "evaluate an unknown system": ["evaluate", "gpt", "--library", "lib"],
-    "evaluate on no library": ["evaluate", "lgtok-lite", "--library", "."],
-    "evaluate an unknown split": ["evaluate", "lgtok-lite", "--library", "lib", "--split", "dev"],
-    "repeats below zero": ["evaluate", "lgtok-lite", "--library", "lib", "--repeats", "-1"],
-    "repeats of words": ["evaluate", "lgtok-lite", "--library", "lib", "--repeats", "many"],
-    "a million texts": ["evaluate", "lgtok-lite", "--library", "lib", "--mm-texts", "1000000"],
-    "samples below zero": ["evaluate", "lgtok-lite", "--library", "lib", "--mm-samples", "-3"],
-    "evaluate with a seed too large": ["evaluate", "lgtok-lite", "--library", "lib", "--seed", "99999999999"],
-    "evaluate with guidance too high": ["evaluate", "lgtok-lite", "--library", "lib", "--guidance", "100"],
-    "evaluate with a cfg that is no number": ["evaluate", "lgtok-lite", "--library", "lib", "--cfg", "nan"],
-    "evaluate without a library": ["evaluate", "lgtok-lite", "--repeats", "1"],
+    "evaluate on no library": ["evaluate", "lgtok", "--library", "."],
+    "evaluate an unknown split": ["evaluate", "lgtok", "--library", "lib", "--split", "dev"],
+    "repeats below zero": ["evaluate", "lgtok", "--library", "lib", "--repeats", "-1"],
+    "repeats of words": ["evaluate", "lgtok", "--library", "lib", "--repeats", "many"],
+    "a million texts": ["evaluate", "lgtok", "--library", "lib", "--mm-texts", "1000000"],
+    "samples below zero": ["evaluate", "lgtok", "--library", "lib", "--mm-samples", "-3"],
+    "evaluate with a seed too large": ["evaluate", "lgtok", "--library", "lib", "--seed", "99999999999"],
+    "evaluate with guidance too high": ["evaluate", "lgtok", "--library", "lib", "--guidance", "100"],
+    "evaluate with a cfg that is no number": ["evaluate", "lgtok", "--library", "lib", "--cfg", "nan"],
+    "evaluate without a library": ["evaluate", "lgtok", "--repeats", "1"],
     "bench into a folder": ["bench", "--json", "."],
 }
 
@@ -128,7 +128,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("empty.npz").write_bytes(b"")
     for name in ("text.npz", "text.bvh"):
         Path(name).write_text("nothing to see\n" * 5)
-    tokens = {"format": 1, "system": "lgtok-lite", "checkpoint": "", "caption": "", "frames": 40, "fps": 20}
+    tokens = {"format": 1, "system": "lgtok", "checkpoint": "", "caption": "", "frames": 40, "fps": 20}
     tokens |= {"levels": [{"size": 1, "codes": 2, "ids": [1]}]}
     Path("tokens.json").write_text(json.dumps(tokens))
     Path("unknown.json").write_text(json.dumps(tokens | {"system": "gpt"}))
@@ -167,7 +167,7 @@ def test_help_is_there(command: str, capsys: pytest.CaptureFixture[str]) -> None
 def test_systems_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["systems", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
-    assert "lgtok-lite" in [row["name"] for row in rows]
+    assert "lgtok" in [row["name"] for row in rows]
     for row in rows:
         assert list(row) == ["name", "tokenizer", "generator", "text", "parameters", "data", "checkpoint"]
         assert row["checkpoint"] in {"shipped", "absent"} and isinstance(row["parameters"], int)
@@ -176,7 +176,7 @@ def test_systems_as_json(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_systems_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["systems"]) == 0
-    assert re.search(r"^lgtok-lite +.*checkpoint (shipped|absent)$", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(r"^lgtok +.*checkpoint (shipped|absent)$", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_an_interrupt_is_no_error_message(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

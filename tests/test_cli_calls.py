@@ -21,7 +21,7 @@ from tests.browser.server import serving
 from tests.conftest import drifting
 
 ROOT = Path(__file__).resolve().parent.parent
-SYSTEM = "lgtok-lite"
+SYSTEM = "lgtok"
 
 
 def run(*call: object, status: int = 0) -> subprocess.CompletedProcess[str]:

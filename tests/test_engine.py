@@ -26,16 +26,16 @@ PROMPT = "a person strolls along"
 
 @pytest.fixture(scope="session")
 def assets(tmp_path_factory):
-    """A folder with a tiny lgtok-lite; its numbers mean nothing, its shapes are real."""
+    """A folder with a tiny lgtok; its numbers mean nothing, its shapes are real."""
     folder = tmp_path_factory.mktemp("assets")
     encoder = identify(load_encoder("minilm"))
     normaliser = Normaliser(np.zeros(67, np.float32), np.full(67, 0.05, np.float32))
     facts = {"step": 3, "seconds": 1.0, "seed": 0}
     tokenizer = tiny_tokenizer(max_frames=196, text_width=384)
-    path = checkpoint_path(folder, "lgtok-lite", "tokenizer")
+    path = checkpoint_path(folder, "lgtok", "tokenizer")
     save_checkpoint(path, tokenizer, Card("tokenizer", tokenizer.config, encoder, "nothing", facts, normaliser))
     network = tiny_generator(text_width=384, lengths=49).transformer
-    path = checkpoint_path(folder, "lgtok-lite", "generator")
+    path = checkpoint_path(folder, "lgtok", "generator")
     save_checkpoint(path, network, Card("generator", network.config, encoder, "nothing", facts))
     return folder
 
@@ -46,11 +46,11 @@ def engine(assets):
 
 
 def test_systems_say_what_their_files_hold(engine, tmp_path):
-    info = next(info for info in engine.systems() if info.name == "lgtok-lite")
-    head = header(checkpoint_path(engine.assets, "lgtok-lite", "tokenizer"))
+    info = next(info for info in engine.systems() if info.name == "lgtok")
+    head = header(checkpoint_path(engine.assets, "lgtok", "tokenizer"))
     assert (info.checkpoint, info.data, info.facts["step"]) == ("shipped", "nothing", 3)
     assert info.parameters > sum(np.prod(v["shape"]) for k, v in head.items() if k.startswith("model.quantizer"))
-    assert engine.scales("lgtok-lite") == list(zip(TINY.scales, TINY.codes, strict=True))
+    assert engine.scales("lgtok") == list(zip(TINY.scales, TINY.codes, strict=True))
     assert all(info.checkpoint == "absent" and info.parameters == 0 for info in Engine(tmp_path).systems())
     with pytest.raises(PlaygroundError, match="no checkpoint here"):
         Engine(tmp_path).tokenize(Motion(drifting()))
@@ -99,7 +99,7 @@ def test_generation_yields_every_scale_and_is_the_same_for_a_seed(engine):
     np.testing.assert_array_equal(whole.motion.joints, steps[-1].motion.joints)
     other = engine.generate(PROMPT, 3.0, seed=5)
     assert any(not np.array_equal(a.ids, b.ids) for a, b in zip(whole.levels, other.levels, strict=True))
-    again = engine.decode(whole.token_file(), guidance=row_of("lgtok-lite").sampling.guidance)
+    again = engine.decode(whole.token_file(), guidance=row_of("lgtok").sampling.guidance)
     np.testing.assert_allclose(again.motion.joints, whole.motion.joints, atol=1e-5)
 
 
@@ -165,14 +165,14 @@ def test_prepare_gives_rows_of_the_canonical_poses():
 
 def test_tokens_of_another_shape_are_refused(engine):
     levels = (LevelTokens(2, 8, np.zeros(2, np.int64)),)
-    with pytest.raises(PlaygroundError, match="do not fit lgtok-lite"):
-        engine.decode(TokenFile("lgtok-lite", "x", "", 40, levels))
+    with pytest.raises(PlaygroundError, match="do not fit lgtok"):
+        engine.decode(TokenFile("lgtok", "x", "", 40, levels))
     with pytest.raises(PlaygroundError, match="unknown system"):
         engine.decode(TokenFile("nothing", "x", "", 40, levels))
 
 
 def test_a_broken_checkpoint_is_one_sentence(tmp_path):
-    path = checkpoint_path(tmp_path, "lgtok-lite", "tokenizer")
+    path = checkpoint_path(tmp_path, "lgtok", "tokenizer")
     path.parent.mkdir(parents=True)
     for data in (b"", b"\xff" * 100, b"\x10" + b"\0" * 7 + b"not json at all!"):
         path.write_bytes(data)
@@ -184,7 +184,7 @@ def test_a_checkpoint_of_another_text_encoder_is_refused(assets, tmp_path):
     tokenizer = tiny_tokenizer(text_width=384)
     other = replace(identify(load_encoder("minilm")), hash="0" * 64)
     normaliser = Normaliser(np.zeros(67, np.float32), np.ones(67, np.float32))
-    path = checkpoint_path(tmp_path, "lgtok-lite", "tokenizer")
+    path = checkpoint_path(tmp_path, "lgtok", "tokenizer")
     save_checkpoint(path, tokenizer, Card("tokenizer", tokenizer.config, other, "x", {}, normaliser))
     with pytest.raises(PlaygroundError, match="text encoder"):
         Engine(tmp_path).tokenize(Motion(drifting(60)))

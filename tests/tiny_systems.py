@@ -47,14 +47,14 @@ def tiny_system(assets: Path, name: str, normaliser: Normaliser) -> None:
     tokenizer_path = checkpoint_path(assets, name, "tokenizer")
     tokenizer, facts = None, {"step": 1, "seconds": 1.0}
     if row.tokenizer is not None:
-        owner = (row.lends or name).replace("lgtok-lite", "lgtok")
+        owner = row.lends or name
         tokenizer = random_model(shrunk(trainings[f"{owner}-tokenizer"].model), 1)
         if not (row.lends and tokenizer_path.is_file()):
             card = Card("tokenizer", tokenizer.config, who, "tiny", facts, normaliser)
             save_checkpoint(tokenizer_path, tokenizer, card)
         facts = facts | {"tokenizer": read_card(tokenizer_path).hash[:12]}
     if row.generator is not None:
-        training = trainings[f"{name.replace('lgtok-lite', 'lgtok')}-generator"]
+        training = trainings[f"{name}-generator"]
         config = shrunk(training.model)
         if tokenizer is not None:
             config = generator_config(training, tokenizer, 384)

@@ -1,7 +1,7 @@
 """The only door of the app, the command line and the notebooks: load once, run, mind the deadline. numpy throughout.
 
     engine = default_engine()
-    tokenized = engine.tokenize(motion, "a person walks", "lgtok-lite")
+    tokenized = engine.tokenize(motion, "a person walks", "lgtok")
     decoded = engine.reconstruct(tokenized, guidance=2.0)
 
 torch is imported at the first call that needs a model, so that importing this package is quick. Scales count from 1

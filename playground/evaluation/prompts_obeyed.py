@@ -1,7 +1,7 @@
 """Does a generated motion do what its prompt says? Judged by joint geometry, no network (issue: prompts obeyed).
 
     report = judge_all(lambda prompt, seconds, seed: joints, seeds=(0, 1, 2))
-    python -m playground.evaluation.prompts_obeyed --system lgtok-lite --json obeyed.json
+    python -m playground.evaluation.prompts_obeyed --system lgtok --json obeyed.json
 
 The judges and their thresholds are in judges.py; how recorded clips fare with them is in
 tests/evaluation/test_prompts_obeyed.py.

@@ -4,7 +4,7 @@ Tokens are drawn once a repeat and decoded at every g; both branches of the deco
 (1 + g) times the one with text minus g times the one without (A8). Windows, captions and tokens are those of the same
 repeat of an evaluation with the same seed.
 
-    python -m playground.evaluation.sweep --system lgtok-lite --library library --repeats 5 --json sweep.json
+    python -m playground.evaluation.sweep --system lgtok --library library --repeats 5 --json sweep.json
 """
 
 import argparse

@@ -24,12 +24,12 @@ from playground.figures.tables import (
     systems_table,
 )
 from playground.figures.theme import finish, reference_line
-from playground.systems import SYSTEMS, checkpoint_path, header
+from playground.systems import BASE_SYSTEM, SYSTEMS, checkpoint_path, header
 
 SAME = "_same_caption"
-TABLE1 = ("lgtok-mini", "lgtok-mid", "lgtok", "lgtok-lite")
-TABLE3 = ("lgtok", "lgtok-notext", "lgtok-rvq", "lgtok-mid", "lgtok-mini", "lgtok-lite")
-PERPLEXITY = ("lgtok", "lgtok-notext", "lgtok-nodrop", "lgtok-mid", "lgtok-mini", "lgtok-lite")
+TABLE1 = ("lgtok-mini", "lgtok-mid", BASE_SYSTEM, "lgtok")
+TABLE3 = (BASE_SYSTEM, "lgtok-notext", "lgtok-rvq", "lgtok-mid", "lgtok-mini", "lgtok")
+PERPLEXITY = (BASE_SYSTEM, "lgtok-notext", "lgtok-nodrop", "lgtok-mid", "lgtok-mini", "lgtok")
 
 
 def _generated(head: str, key: str) -> Column:
@@ -99,13 +99,13 @@ def quality_claims(results: Results) -> Table:
 
     return claims_table((
         pair("160 tokens rebuild better than 104 (rFID)", "lgtok-mid", "lgtok-mini", "reconstruction", "fid"),
-        pair("236 tokens rebuild better than 160 (rFID)", "lgtok", "lgtok-mid", "reconstruction", "fid"),
-        pair("160 tokens generate better than 236 (gFID; Table 1, without text)", "lgtok-mid", "lgtok", "generated",
+        pair("236 tokens rebuild better than 160 (rFID)", BASE_SYSTEM, "lgtok-mid", "reconstruction", "fid"),
+        pair("160 tokens generate better than 236 (gFID; Table 1, without text)", "lgtok-mid", BASE_SYSTEM, "generated",
              "fid"),
-        pair("text at both ends rebuilds better (rFID)", "lgtok", "lgtok-notext", "reconstruction", "fid"),
-        pair("text at both ends rebuilds more to the caption (Top 1)", "lgtok", "lgtok-notext", "reconstruction",
+        pair("text at both ends rebuilds better (rFID)", BASE_SYSTEM, "lgtok-notext", "reconstruction", "fid"),
+        pair("text at both ends rebuilds more to the caption (Top 1)", BASE_SYSTEM, "lgtok-notext", "reconstruction",
              "r_precision_top1_pool32", lower=False),
-        pair("text at both ends generates better (gFID)", "lgtok", "lgtok-notext", "generated", "fid"),
+        pair("text at both ends generates better (gFID)", BASE_SYSTEM, "lgtok-notext", "generated", "fid"),
     ))  # fmt: skip
 
 
@@ -129,7 +129,7 @@ def perplexity_claims(results: Results) -> Table:
     """With text at both ends of the tokenizer the generator is more certain."""
 
     def claim(text: str, key: str) -> Claim:
-        with_text, without = (of_system(results, name, key, of="generated") for name in ("lgtok", "lgtok-notext"))
+        with_text, without = (of_system(results, name, key, of="generated") for name in (BASE_SYSTEM, "lgtok-notext"))
         return Claim(text, with_text, without)
 
     return claims_table((

@@ -1,6 +1,6 @@
 """The token file: the tokens of one motion as JSON that a person can read and another program can write. No torch.
 
-{"format": 1, "system": "lgtok-lite", "checkpoint": "...", "caption": "...", "frames": 196, "fps": 20,
+{"format": 1, "system": "lgtok", "checkpoint": "...", "caption": "...", "frames": 196, "fps": 20,
  "levels": [{"size": 3, "codes": 128, "ids": [5, 17, 101]}, ...]}
 """
 

@@ -18,6 +18,7 @@ from playground.nn.blocks import UStack
 from playground.nn.linear import Conv3, Linear
 from playground.nn.modules import WordTable
 from playground.nn.rope import Rotation, rope_angles
+from playground.nn.seams import Seams
 from playground.nn.sequences import join_masks, put_before
 from playground.text.encoders import TextFeatures
 from playground.tokenizers.base import Quantized, Tokens, TrainingOutput
@@ -75,6 +76,7 @@ class TokenizerConfig:
     small_init: bool = (
         True  # weights from a normal of std 0.02 (A3); False: torch's own, which learns faster when pre-norm
     )
+    seam: int = 0  # width of the convolutions that join the patches' frames (nn/seams.py), 0: none; ours
 
     @property
     def latents(self) -> int:
@@ -142,6 +144,7 @@ class LGTok(nn.Module):
             self.table_in = nn.Parameter(torch.randn(total, c.width) * c.width**-0.5)
         if c.small_init:
             self.apply(_init)
+        self.seams = Seams(c.columns, c.seam, c.patch) if c.seam else None
 
     # ---- positions and masks -------------------------------------------------------------------------------------
 
@@ -272,7 +275,9 @@ class LGTok(nn.Module):
         motion = self.motion_out(out[:, -count:])  # (B or 2B, F / patch, patch * C)
         motion = motion.reshape(len(out), count * c.patch, c.columns)[:, :frames]
         real = length_mask(lengths, frames)
-        return motion if real is None else motion * real.repeat(len(out) // batch, 1)[..., None]
+        real = None if real is None else real.repeat(len(out) // batch, 1)[..., None]
+        motion = motion if self.seams is None else self.seams(motion, real)
+        return motion if real is None else motion * real
 
     def _memory(self, batch: int, text: TextFeatures | None, dropped: Tensor | None) -> Memory | None:
         if not self.text_out:

@@ -48,7 +48,7 @@ class TokenizerTraining:
 
 
 TOKENIZERS: dict[str, TokenizerTraining] = {
-    "lgtok-lite-tokenizer": TokenizerTraining(
+    "lgtok-tokenizer": TokenizerTraining(
         model=PRESETS["lite"],
         batch=BatchConfig(size=32, speed=0.3, source_balance=0.5, action_balance=0.3),
         schedule=Schedule(steps=2_600, rate=1e-3),
@@ -77,9 +77,9 @@ class GeneratorTraining:
 
 
 GENERATORS: dict[str, GeneratorTraining] = {
-    "lgtok-lite-generator": GeneratorTraining(
+    "lgtok-generator": GeneratorTraining(
         model=GENERATOR_PRESETS["lite"],
-        tokenizer="lgtok-lite-tokenizer",
+        tokenizer="lgtok-tokenizer",
         batch=BatchConfig(size=64, whole=0.8, source_balance=0.5, action_balance=0.6),
         schedule=Schedule(steps=5_400, rate=8e-4, weight_decay=1e-5, clip=1.0, fall=0.35),
         synthetic=0.4,  # 0.1 in the first 4,400 steps of the shipped one
@@ -113,19 +113,24 @@ class RefitTraining:
     synthetic: float = 0.1
     language_drop: float = 0.1
     velocity: float = 2.0  # weight of smoothL1 on differences of successive rows
+    smooth: float = 0.0  # weight of smoothL1 on second differences of rows (tokenizer.jump_loss)
     feet: float = 0.0  # weight of the toes' speed over the ground, where the true ones stand on it
     redrawn: float = 0.45  # share of motions whose fine scales the generator drew anew
     coarse: float = 0.2  # share of motions of which the coarse scales alone are given
     true_scales: int = 3  # at least so many scales are true
     cfg: float = 3.0  # guidance of the generator
+    seam: int = 0  # width of convolutions over the frames that are added (nn/seams.py); 0 adds none
     seed: int = 0
 
 
 REFITS: dict[str, RefitTraining] = {
-    "lgtok-lite-refit": RefitTraining(
-        tokenizer_training=TOKENIZERS["lgtok-lite-tokenizer"],
+    "lgtok-refit": RefitTraining(
+        tokenizer_training=TOKENIZERS["lgtok-tokenizer"],
         batch=BatchConfig(size=32, whole=0.8, source_balance=0.5, action_balance=0.3),
         schedule=Schedule(steps=2_700, rate=5e-4, warmup=100, fall=0.5),
+        feet=0.1,  # this, the next and the last in the third round of the shipped one alone
+        smooth=1.0,
+        seam=96,
     ),
 }
 

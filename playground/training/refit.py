@@ -28,9 +28,9 @@ from playground.tokenizers.base import TrainingOutput
 from playground.tokenizers.transformer import LGTok
 from playground.training.configs import RefitTraining
 from playground.training.feet import foot_loss
-from playground.training.tokenizer import reconstruction_errors, tokenizer_loss, velocity_loss
+from playground.training.tokenizer import jump_loss, reconstruction_errors, tokenizer_loss, velocity_loss
 
-REFIT = ("decoder", "from_code", "motion_out", "query_positions")  # what is trained
+REFIT = ("decoder", "from_code", "motion_out", "query_positions", "seams")  # what is trained
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +112,8 @@ class RefitStep(nn.Module):
         )
         moved = velocity_loss(out.float(), features, batch.lengths, batch.mean_frames)
         loss = loss + c.velocity * moved
+        if c.smooth:
+            loss = loss + c.smooth * jump_loss(out.float(), features, batch.lengths, batch.mean_frames)
         if c.feet:
             rows, real = (x * self.std + self.mean for x in (out.float(), features))
             loss = loss + c.feet * foot_loss(rows, real, batch.lengths, batch.mean_frames)
@@ -184,7 +186,7 @@ class RefitTask:
         refit = {key: facts[key] for key in ("step", "seconds")} | {"from": self.card.hash[:12]}
         refits = [*self.card.facts.get("refit", []), refit]  # one may follow another
         merged = self.card.facts | {"refit": refits, "validation": facts["validation"]}
-        save_checkpoint(path, self.tokenizer, replace(self.card, facts=merged))
+        save_checkpoint(path, self.tokenizer, replace(self.card, config=self.tokenizer.config, facts=merged))
         network, card = self.generator
         named = card.facts | {"tokenizer": read_card(path).hash[:12]}
         save_checkpoint(path.parents[1] / "generator" / path.name, network, replace(card, facts=named))

@@ -98,7 +98,7 @@ def find_training(name: str, size: str = "cpu") -> Training:
     if size not in SIZES:
         raise PlaygroundError(f"unknown size {size!r}; accepted: {', '.join(SIZES)}")
     known: dict[str, Training] = {
-        **FAMILY[size], **TOKENIZERS, **GENERATORS, **OTHERS, **REFITS, **REFINERS, **EVALUATORS
+        **TOKENIZERS, **GENERATORS, **REFITS, **FAMILY[size], **OTHERS, **REFINERS, **EVALUATORS
     }  # fmt: skip
     if name not in known:
         raise PlaygroundError(f"unknown training {name!r}; known are {', '.join(known)}")
@@ -225,7 +225,9 @@ def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
     frozen, network = frozen.to(fabric.device), network.to(fabric.device)
     with Progress("drawing tokens of the training clips") as progress:
         bank = build_refit_bank(caller(network, frozen), frozen, batches, store, config, progress)
-    model = build(card.config)
+    with torch.random.fork_rng():
+        torch.manual_seed(config.seed)
+        model = build(replace(card.config, seam=config.seam or card.config.seam))
     model.load_state_dict(frozen.state_dict(), strict=False)
     validation = whole_batches(held_out, normaliser, config.batch.size) if held_out else []
     task = RefitTask(model, config, bank, batches, validation, store, card, (network, generator_card), fabric.device)

@@ -19,6 +19,7 @@ from playground.tokenizers.base import Tokenizer, TrainingOutput
 from playground.training.configs import TokenizerTraining
 
 JOINTS = slice(4, None)  # columns of the joint positions
+JUMP = 0.02  # of the normalised features: second differences beyond it count in proportion, not squared
 HEADING_SCALE = 0.4  # radians of yaw that move an outstretched hand by about one standard deviation of the positions
 
 
@@ -57,6 +58,15 @@ def velocity_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: f
     """smoothL1 on the differences of successive rows of out and features [B, F, C], over real rows; scalar."""
     inside = torch.arange(1, features.shape[1], device=lengths.device)[None] < lengths[:, None]
     error = F.smooth_l1_loss(out.diff(dim=1), features.diff(dim=1), reduction="none").mean(dim=-1)
+    return (error * inside).sum() / mean_frames
+
+
+def jump_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
+    """smoothL1, straight beyond JUMP, on the second differences of rows of out and features [B, F, C], over real rows;
+    scalar. Nearly straight everywhere, it minds the small jumps from patch to patch as much as the fast motions."""
+    inside = torch.arange(2, features.shape[1], device=lengths.device)[None] < lengths[:, None]
+    made, real = (rows.diff(n=2, dim=1) for rows in (out, features))
+    error = F.smooth_l1_loss(made, real, reduction="none", beta=JUMP).mean(dim=-1)
     return (error * inside).sum() / mean_frames
 
 

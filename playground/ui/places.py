@@ -16,7 +16,7 @@ class Scales:
 
 @dataclass(frozen=True)
 class Token:
-    """A selected token; scale from 1, position from 0. In an address lgtok-lite.3.5."""
+    """A selected token; scale from 1, position from 0. In an address lgtok.3.5."""
 
     system: str
     scale: int

@@ -1,6 +1,6 @@
 """The state of the page in its address: one table of controls, an address read into a State and written from one.
 
-    /?room=generate&prompt=a+person+waves&seed=7&system=lgtok-lite&hide=seed
+    /?room=generate&prompt=a+person+waves&seed=7&system=lgtok&hide=seed
 
 A control is a row of CONTROLS; the same key may stand in several rooms with another default. A room makes its controls
 from their rows (`control("generate", "seed").label`, `.default`, `.low`, `.high`, `.element`) and joins the address as

@@ -26,7 +26,7 @@ from playground.analysis.results import (
 from playground.errors import PlaygroundError
 from playground.motion.skeleton import HUMAN22
 
-SYSTEM = "lgtok-lite"
+SYSTEM = "lgtok"
 RESULT = Result(
     "evaluation",
     "python -m somewhere",
@@ -43,14 +43,14 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert path == result_path("evaluation", SYSTEM, tmp_path / "new") and not list(path.parent.glob("*.partial"))
     assert list(json.loads(path.read_text())) == ["item", "made_by", "provenance", "real", "rows"]
     assert read_result("evaluation", SYSTEM, tmp_path / "new") == RESULT
-    assert read_result("evaluation", "lgtok", tmp_path / "new") is None
+    assert read_result("evaluation", "lgtok-mid", tmp_path / "new") is None
 
 
 @pytest.mark.parametrize(
     "text",
     ["", "[]", "{}", "null", '{"item": "evaluation", "made_by": "", "provenance": {}, "rows": []}',
-     '{"item": "evaluation", "made_by": "", "provenance": {"system": "lgtok-lite"}, "rows": [1]}',
-     '{"item": "other", "made_by": "", "provenance": {"system": "lgtok-lite"}, "rows": []}',
+     '{"item": "evaluation", "made_by": "", "provenance": {"system": "lgtok"}, "rows": [1]}',
+     '{"item": "other", "made_by": "", "provenance": {"system": "lgtok"}, "rows": []}',
      '{"item": "evaluation", "made_by": "", "provenance": [], "rows": []}'],
 )  # fmt: skip
 def test_a_broken_file_is_told(tmp_path: Path, text: str) -> None:

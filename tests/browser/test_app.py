@@ -31,8 +31,8 @@ def shipped(*parts: Path) -> None:
 
 @pytest.fixture(scope="module")
 def app() -> Iterator[str]:
-    files = [checkpoint_path(ASSETS, "lgtok-lite", part) for part in ("tokenizer", "generator")]
-    shipped(*files, ASSETS / "examples" / "index.json", ASSETS / "analysis" / "lgtok-lite.json")
+    files = [checkpoint_path(ASSETS, "lgtok", part) for part in ("tokenizer", "generator")]
+    shipped(*files, ASSETS / "examples" / "index.json", ASSETS / "analysis" / "lgtok.json")
     with serving("-m", "playground", "app", "--host", "127.0.0.1", "--port", "{port}") as address:
         yield address
 

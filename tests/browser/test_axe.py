@@ -60,7 +60,7 @@ def test_a_room_has_no_grave_fault(page: Page, room: str) -> None:
 
 
 SELECT = """(name) => MotionStage.get(name).store.commit('select',
-  { selection: { system: 'lgtok-lite', scale: 3, position: 1 } })"""
+  { selection: { system: 'lgtok', scale: 3, position: 1 } })"""
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -47,15 +47,15 @@ def test_a_swap_moves_the_motion_and_can_be_undone(seen: Visit) -> None:
     expect(page.locator("#tokenize-card [role=status]")).to_contain_text("at most 100 mm")
     expect(page.locator("#tokenize-stage .ms-labels")).to_contain_text("With the other code")
     expect(page.locator("#tokenize-score .ms-heads")).to_contain_text("What moves when code")
-    assert page.evaluate(STATE)["selection"] == {"system": "lgtok-lite", "scale": 5, "position": 2}
-    expect(page).to_have_url(re.compile(r"selection=lgtok-lite\.5\.2.*code=\d+|code=\d+.*selection=lgtok-lite\.5\.2"))
+    assert page.evaluate(STATE)["selection"] == {"system": "lgtok", "scale": 5, "position": 2}
+    expect(page).to_have_url(re.compile(r"selection=lgtok\.5\.2.*code=\d+|code=\d+.*selection=lgtok\.5\.2"))
     page.get_by_role("button", name="Undo").click()
     expect(page.locator("#tokenize-stage .ms-labels")).not_to_contain_text("With the other code")
     expect(page).not_to_have_url(re.compile("code="))
 
 
 def test_a_link_to_a_swap_shows_it_in_a_fresh_profile(visit: Go, stand_in: str) -> None:
-    page = visit(stand_in + "?room=tokenize&motion=m1&selection=lgtok-lite.4.1&code=9").page
+    page = visit(stand_in + "?room=tokenize&motion=m1&selection=lgtok.4.1&code=9").page
     expect(page.locator("#tokenize-card [role=status]")).to_contain_text("became 9")
     assert page.evaluate(FIGURES) == ["original", "rebuilt", "swapped"]
 
@@ -78,7 +78,7 @@ def test_the_card_leads_to_a_clip_that_has_the_code(visit: Go, stand_in: str) ->
     example = engine.examples()[0]
     ids = engine.tokenize(example.motion(), example.caption).levels[9].ids
     position = next(n for n, code in enumerate(ids) if bundle.where_used(9, int(code)))
-    page = visit(stand_in + f"?room=tokenize&motion={example.id}&selection=lgtok-lite.10.{position}").page
+    page = visit(stand_in + f"?room=tokenize&motion={example.id}&selection=lgtok.10.{position}").page
     link = page.locator("#tokenize-card a").first
     expect(link).to_be_visible()
     motion = re.search(r"motion=([^&]+)", link.get_attribute("href") or "")
@@ -119,6 +119,6 @@ def test_what_the_words_do(seen: Visit) -> None:
 
 
 def test_the_card_fits_a_phone(visit: Go, stand_in: str) -> None:
-    page = visit(stand_in + "?room=tokenize&motion=m1&selection=lgtok-lite.4.1&code=9", viewport=PHONE).page
+    page = visit(stand_in + "?room=tokenize&motion=m1&selection=lgtok.4.1&code=9", viewport=PHONE).page
     expect(page.locator("#tokenize-card [role=status]")).to_contain_text("became 9")
     assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]

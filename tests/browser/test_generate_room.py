@@ -29,7 +29,7 @@ def pick_token(page: Page) -> None:
     """The token at scale 3, position 1, by a click where it stands."""
     page.evaluate(
         "() => MotionStage.get('generate').store.commit('select',"
-        " { selection: { system: 'lgtok-lite', scale: 3, position: 1 } })"
+        " { selection: { system: 'lgtok', scale: 3, position: 1 } })"
     )
     expect(page.locator("#generate-token .mtp-drawn")).to_contain_text("scale 3, token 2 of 3")
 

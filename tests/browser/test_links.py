@@ -13,7 +13,7 @@ from tests.browser.conftest import Visit
 
 pytestmark = pytest.mark.browser
 Go = Callable[..., Visit]
-LINK = "?room=generate&prompt=a+person+waves&seed=7&seconds=3&system=lgtok-lite&hide=seed"
+LINK = "?room=generate&prompt=a+person+waves&seed=7&seconds=3&system=lgtok&hide=seed"
 PROMPT = 'somebody "jumps" & turns <b>'
 CLIPBOARD = "() => navigator.clipboard.readText()"
 TOKENS = "(name) => MotionStage.get(name).data.tracks[0].levels.map((level) => Array.from(level.ids ?? []))"
@@ -97,7 +97,7 @@ def test_a_selected_token_is_in_the_link_and_comes_back(visit: Go, stand_in: str
     page = visit(stand_in).page
     page.wait_for_function(WHOLE, arg="tokenize")
     page.locator("#tokenize-score .ms-roll").click(position={"x": 400, "y": 60})
-    page.wait_for_function("() => location.search.includes('selection=lgtok-lite.')")
+    page.wait_for_function("() => location.search.includes('selection=lgtok.')")
     chosen = page.evaluate("() => MotionStage.get('tokenize').state.selection")
     other = visit(page.url).page
     other.wait_for_function("() => window.MotionStage?.get('tokenize')?.state.selection")
@@ -107,7 +107,7 @@ def test_a_selected_token_is_in_the_link_and_comes_back(visit: Go, stand_in: str
 @pytest.mark.parametrize(
     "query",
     ["?room=nowhere&seed=x", "?room=generate&prompt=%00&seed=-5&hide=%3Cscript%3E,*,body", "?" + "a=1&" * 2_000,
-     "?room=tokenize&motion=gone&scales=99&selection=lgtok-lite.900.900",
+     "?room=tokenize&motion=gone&scales=99&selection=lgtok.900.900",
      "?room=%22%3E%3Cimg%20src%3Dx%20onerror%3Dalert(1)%3E"],
 )  # fmt: skip
 def test_a_hostile_link_shows_a_working_page(visit: Go, stand_in: str, query: str) -> None:

@@ -72,7 +72,7 @@ def test_a_system_without_tokens_shows_the_map_alone(visit: Go, with_denoiser: s
     page.get_by_role("button", name="Sampling and guidance").click()
     expect(page.locator("#generate-s input[type=number]")).to_have_value("2.5")  # its own guidance
     page.locator("#generate-system input").click()
-    page.get_by_role("option", name="LG-Tok lite").click()
+    page.get_by_role("option", name="LG-Tok").click()
     expect(page.locator("#generate-s input[type=number]")).not_to_have_value("2.5")
     page.locator("#generate-go").click()
     page.wait_for_function("() => MotionStage.get('generate').data?.tracks[0]?.levels[9].ids")

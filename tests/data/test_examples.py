@@ -15,7 +15,7 @@ from playground.errors import PlaygroundError
 def tokens(sizes: list[int], codes: list[int], seed: int = 0) -> StoredTokens:
     rng = np.random.default_rng(seed)
     ids = tuple(rng.integers(0, count, size) for size, count in zip(sizes, codes, strict=True))
-    return StoredTokens("lgtok-lite", "abc123", ids, tuple(codes))
+    return StoredTokens("lgtok", "abc123", ids, tuple(codes))
 
 
 def example(id: str, kind: str = "synthetic", frames: int = 20, **changes: object) -> StoredExample:

@@ -113,7 +113,7 @@ def test_a_detokenizer_that_reads_text_in_context_has_no_heat_map(tmp_path):
     model = tiny_tokenizer(max_frames=196, text_width=384, text_mixing_out="in-context")
     normaliser = Normaliser(np.zeros(67, np.float32), np.ones(67, np.float32))
     card = Card("tokenizer", model.config, identify(load_encoder("minilm")), "nothing", {}, normaliser)
-    save_checkpoint(checkpoint_path(tmp_path, "lgtok-lite", "tokenizer"), model, card)
+    save_checkpoint(checkpoint_path(tmp_path, "lgtok", "tokenizer"), model, card)
     other = Engine(tmp_path)
     with pytest.raises(PlaygroundError, match="no cross-attention"):
         other.attention(other.tokenize(Motion(swaying(61, 3)), "a person walks"))

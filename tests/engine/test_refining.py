@@ -15,7 +15,7 @@ from tests.tiny import tiny_refiner
 @pytest.fixture
 def refining(engine):
     """The tiny engine with a refiner, which is gone afterwards, and its network."""
-    normaliser = engine.runtime("lgtok-lite").normaliser
+    normaliser = engine.runtime("lgtok").normaliser
     network = tiny_refiner(engine.assets, replace(normaliser, mean=normaliser.mean + 0.01, std=normaliser.std * 2))
     yield engine, network
     refiner_path(engine.assets).unlink()
@@ -36,7 +36,7 @@ def test_the_body_and_the_tokens_stay_and_the_root_is_what_the_network_says(refi
     assert made.levels is generation.levels and np.array_equal(generation.features, before)
     assert made.refiner == engine.refiner().checkpoint and made.prompt == generation.prompt
 
-    runtime, own = engine.runtime("lgtok-lite"), engine.refiner().normaliser
+    runtime, own = engine.runtime("lgtok"), engine.refiner().normaliser
     rows, changed = (runtime.normaliser.invert(one.features) for one in (generation, made))
     np.testing.assert_allclose(np.delete(changed, (1, 2), axis=1), np.delete(rows, (1, 2), axis=1), atol=1e-5)
     seen = torch.from_numpy(own.apply(rows))[None]
@@ -60,6 +60,6 @@ def test_motions_of_several_lengths_are_each_what_they_are_alone(refining):
 def test_a_file_of_another_kind_is_refused(refining):
     engine, _ = refining
     path = refiner_path(engine.assets)
-    path.write_bytes((engine.assets / "checkpoints" / "lgtok-lite" / "tokenizer.safetensors").read_bytes())
+    path.write_bytes((engine.assets / "checkpoints" / "lgtok" / "tokenizer.safetensors").read_bytes())
     with pytest.raises(PlaygroundError, match="no refiner checkpoint"):
         open_refiner(engine.assets)

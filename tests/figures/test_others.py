@@ -95,7 +95,7 @@ def test_validation_curves() -> None:
 
 def test_levels_of_systems_and_of_runs() -> None:
     found = levels.of_systems({
-        "lgtok-lite": Result("levels", "", {"system": "lgtok-lite"}, level_rows(2, 60.0), {"between": [[1.0]]}),
+        "lgtok": Result("levels", "", {"system": "lgtok"}, level_rows(2, 60.0), {"between": [[1.0]]}),
         "mogo": None,
     })  # fmt: skip
     figure = levels.kept_plot(found, "mpjpe_mm", "tokens")
@@ -106,7 +106,7 @@ def test_levels_of_systems_and_of_runs() -> None:
     runs = levels.of_runs(STORED, "mogo3")
     assert [len(one.rows) for one in runs] == [2, 3, 0]
     table = levels.levels_table([*found, *runs])
-    assert ("LG-Tok lite", "2", "6", "58.0 ± 0.0", "0.333 ± 0.010", "20.0", "0.200") in table.rows
+    assert ("LG-Tok", "2", "6", "58.0 ± 0.0", "0.333 ± 0.010", "20.0", "0.200") in table.rows
     maps = on_dark(levels.between_maps(runs))
     assert [list(line) for line in maps.data[1].z] == [[1.0, 0.25], [0.25, 1.0]] and not levels.between_maps([]).data
     assert not levels.kept_plot(levels.of_runs(None, "mogo3")).data
@@ -148,10 +148,10 @@ def test_tables_of_systems_take_their_own_side() -> None:
     rows = [{"of": of, "fid": entry(start), "r_precision_top1_pool32": entry(start + 1), "mpjpe_mm": entry(start + 2)}
             for of, start in (("generated", 10.0), ("reconstruction", 20.0))]  # fmt: skip
     rows.append({"of": "every clip once", "mpjpe_mm_source_mean": 47.0})
-    results = {"lgtok-lite": Result("evaluation", "", {"system": "lgtok-lite", "tokens": 5}, rows), "mogo": None}
-    assert row_of(others.rebuilt_table(results), "LG-Tok lite")["rFID"].startswith("20")
-    assert row_of(others.rebuilt_table(results), "LG-Tok lite")["mean over sources"] == "47.0"
-    assert row_of(others.generated_table(results), "LG-Tok lite")["FID"].startswith("10")
+    results = {"lgtok": Result("evaluation", "", {"system": "lgtok", "tokens": 5}, rows), "mogo": None}
+    assert row_of(others.rebuilt_table(results), "LG-Tok")["rFID"].startswith("20")
+    assert row_of(others.rebuilt_table(results), "LG-Tok")["mean over sources"] == "47.0"
+    assert row_of(others.generated_table(results), "LG-Tok")["FID"].startswith("10")
 
 
 def test_an_unknown_quote_is_told() -> None:

@@ -8,9 +8,10 @@ from playground.analysis.results import Result
 from playground.figures import ablations, editing, language, quality, timing
 from playground.figures.tables import Table
 from playground.figures.theme import on_dark
+from playground.systems import BASE_SYSTEM
 from tests.conftest import drifting
 
-LITE, FLAGSHIP, BARE = "lgtok-lite", "lgtok", "lgtok-notext"
+BASE, FLAGSHIP, BARE = BASE_SYSTEM, "lgtok", "lgtok-notext"
 
 
 def facts(system: str, **more: object) -> dict:
@@ -51,13 +52,16 @@ def cells(table: Table, first: str) -> dict[str, str]:
 
 # ---- quality ---------------------------------------------------------------------------------------------------------
 
-EVALUATIONS = {FLAGSHIP: evaluation(FLAGSHIP, 1.0), BARE: evaluation(BARE, 2.0), "lgtok-mid": None, LITE: None}
+EVALUATIONS = {BASE: evaluation(BASE, 1.0), BARE: evaluation(BARE, 2.0), "lgtok-mid": None, FLAGSHIP: None}
 
 
 def test_table_1_takes_both_fids() -> None:
-    row = cells(quality.table1(EVALUATIONS), "LG-Tok")
+    row = cells(quality.table1(EVALUATIONS), "LG-Tok lite")
     assert (row["rFID"], row["gFID"], row["MPJPE, mm"]) == ("201 ± 0", "1.00 ± 0.01", "209 ± 0")
-    assert cells(quality.table1({FLAGSHIP: None}), "LG-Tok")["rFID"] in ("not trained yet", "trained, not measured yet")
+    assert cells(quality.table1({BASE: None}), "LG-Tok lite")["rFID"] in (
+        "not trained yet",
+        "trained, not measured yet",
+    )
 
 
 def test_table_2_begins_with_real_motion_and_says_why_a_number_is_missing() -> None:
@@ -65,13 +69,13 @@ def test_table_2_begins_with_real_motion_and_says_why_a_number_is_missing() -> N
     assert table.rows[0][0] == "real motion" and cells(table, "real motion")["FID"].startswith("101")
     assert cells(table, "LG-Tok without text")["Top 3"].startswith("4.00")
     more = quality.table2_more(EVALUATIONS)
-    assert cells(more, "LG-Tok")["Top 3, pool of 100"] == "–" and "a pool of 100 needs 100" in more.caption
-    assert cells(more, "LG-Tok")["prompts obeyed, %"].startswith("1,600")
+    assert cells(more, "LG-Tok lite")["Top 3, pool of 100"] == "–" and "a pool of 100 needs 100" in more.caption
+    assert cells(more, "LG-Tok lite")["prompts obeyed, %"].startswith("1,600")
     assert "make figures" in more.caption  # the files shipped are others than these
 
 
 def test_table_3_and_the_claims() -> None:
-    row = cells(quality.table3(EVALUATIONS), "LG-Tok")
+    row = cells(quality.table3(EVALUATIONS), "LG-Tok lite")
     assert (row["MPJPE, mean over sources"], row["Top 1"], row["MM-Dist"]) == ("47.2", "202 ± 0", "5.00 ± 0.01")
     claims = quality.quality_claims(EVALUATIONS).rows
     assert claims[3][3] == "seen, the intervals are apart" and claims[4][3].startswith("not seen")
@@ -79,7 +83,7 @@ def test_table_3_and_the_claims() -> None:
 
 
 def test_perplexities() -> None:
-    row = cells(quality.perplexity_table(EVALUATIONS), "LG-Tok")
+    row = cells(quality.perplexity_table(EVALUATIONS), "LG-Tok lite")
     assert (row["of the true tokens"], row["of arg-max codes"]) == ("12.0 ± 0.0", "13.0 ± 0.0")
     assert all(row[3].startswith("seen") for row in quality.perplexity_claims(EVALUATIONS).rows)
 
@@ -90,14 +94,14 @@ def test_the_planes_of_fig_2_hold_paper_and_ours() -> None:
     assert names["MoMask"].x[0] == 0.116 and names["MoMask"].xaxis == "x"
     ours = [trace for trace in figure.data if trace.xaxis == "x2"]
     assert [(trace.x[0], trace.y[0]) for trace in ours] == [(1.0, 2.0), (2.0, 3.0)]
-    assert ours[0].error_x.array[0] == 0.01 and "LG-Tok" in {trace.name for trace in ours}
+    assert ours[0].error_x.array[0] == 0.01 and "LG-Tok lite" in {trace.name for trace in ours}
     assert on_dark(figure).data
 
 
 def test_the_lines_of_table_1_run_over_tokens() -> None:
     mini = evaluation("lgtok-mini", 5.0)
     mini.provenance["tokens"] = 104
-    figure = quality.tokens_plot({FLAGSHIP: EVALUATIONS[FLAGSHIP], "lgtok-mini": mini})
+    figure = quality.tokens_plot({BASE: EVALUATIONS[BASE], "lgtok-mini": mini})
     ours = [trace for trace in figure.data if trace.xaxis == "x2"]
     assert [list(trace.x) for trace in ours] == [[104, 160]] * 2
     assert list(ours[0].y) == [205.0, 201.0] and list(ours[1].y) == [5.0, 1.0]
@@ -108,28 +112,28 @@ def test_the_lines_of_table_1_run_over_tokens() -> None:
 
 
 def test_the_best_guidance_is_found_in_both_directions() -> None:
-    found = sweep(LITE, 2.0)
+    found = sweep(FLAGSHIP, 2.0)
     assert (
         language.best_guidance(found)[0] == 2.0 and language.best_guidance(found, language.TOP, lower=False)[0] == 0.0
     )
     assert language.best_guidance(Result("guidance_sweep", "", {}, [{"g": 0.0, "fid": {"mean": None}}])) is None
-    table = language.sweep_table({LITE: found, FLAGSHIP: None})
-    assert cells(table, "LG-Tok lite")["best g by FID"] == "2"
-    assert cells(table, "LG-Tok lite")["FID"] == "1.00 ± 0.01; at 0: 3.00 ± 0.01"
+    table = language.sweep_table({FLAGSHIP: found, BASE: None})
+    assert cells(table, "LG-Tok")["best g by FID"] == "2"
+    assert cells(table, "LG-Tok")["FID"] == "1.00 ± 0.01; at 0: 3.00 ± 0.01"
 
 
 def test_the_sweep_is_drawn_with_its_intervals() -> None:
-    figure = language.sweep_plot({LITE: sweep(LITE, 1.0), FLAGSHIP: None})
-    curves = [trace for trace in figure.data if trace.name == "LG-Tok lite"]
+    figure = language.sweep_plot({FLAGSHIP: sweep(FLAGSHIP, 1.0), BASE: None})
+    curves = [trace for trace in figure.data if trace.name == "LG-Tok"]
     assert [list(curve.y) for curve in curves] == [[2.0, 1.0, 2.0, 3.0], pytest.approx([0.9, 0.8, 0.7, 0.6])]
     assert all(list(curve.error_y.array) == [0.01] * 4 for curve in curves)
     assert {shape.y0 for shape in figure.layout.shapes} == {0.5, 0.97}
-    assert "not measured yet" in str(language.sweep_plot({LITE: None}).layout.annotations[0].text)
+    assert "not measured yet" in str(language.sweep_plot({FLAGSHIP: None}).layout.annotations[0].text)
 
 
 def test_table_5_and_its_claims() -> None:
-    results = {FLAGSHIP: sweep(FLAGSHIP, 2.0), "lgtok-nodrop": sweep("lgtok-nodrop", 0.0), BARE: sweep(BARE, 0.5)}
-    row = cells(language.table5(results), "LG-Tok")
+    results = {BASE: sweep(BASE, 2.0), "lgtok-nodrop": sweep("lgtok-nodrop", 0.0), BARE: sweep(BARE, 0.5)}
+    row = cells(language.table5(results), "LG-Tok lite")
     assert (row["FID, g = 0"], row["FID, g = 2"], row["Top 3, g = 1"]) == (
         "3.00 ± 0.01",
         "1.00 ± 0.01",
@@ -145,7 +149,7 @@ def test_table_8_has_a_row_for_every_reading() -> None:
             for drawn, start in (("free", 10.0), ("prompted", 1.0))
             for read, fid in (("no text", start + 1), ("text, g = 0", start), ("text, g = 1", start - 0.5),
                               ("text, g = 2", start + 5))]  # fmt: skip
-    results = {LITE: Result("free_form", "", facts(LITE), rows), FLAGSHIP: None}
+    results = {FLAGSHIP: Result("free_form", "", facts(FLAGSHIP), rows), BASE: None}
     table = language.table8(results)
     assert [row[1:4] for row in table.rows[:2]] == [("free-form", "no text", "11.0 ± 0.0"),
                                                     ("free-form", "text, g = 0", "10.0 ± 0.0")]  # fmt: skip
@@ -210,33 +214,35 @@ def edits() -> Result:
     motion = packed(drifting(196))
     example = {"kind": "inpaint", "caption": "before", "prompt": "after", "seed": 0, "drawn": [[100, 160]],
                "source": motion, "motion": motion}  # fmt: skip
-    return Result("edits", "", facts(LITE), rows, {"examples": [example]})
+    return Result("edits", "", facts(FLAGSHIP), rows, {"examples": [example]})
 
 
 def test_edits_by_mask() -> None:
-    table = editing.edits_table({LITE: edits(), FLAGSHIP: None})
+    table = editing.edits_table({FLAGSHIP: edits(), BASE: None})
     assert len(table.rows) == 5 and table.rows[0][2:] == tuple(f"{v:.2f} ± 0.01" for v in range(1, 7))
-    figure = editing.seams_plot({FLAGSHIP: None, LITE: edits()})
+    figure = editing.seams_plot({BASE: None, FLAGSHIP: edits()})
     assert [(bar.name, bar.y[0]) for bar in figure.data] == list(zip(editing.BORDERS.values(), (1, 2, 3), strict=True))
-    assert "not measured yet" in editing.seams_plot({LITE: None}).layout.annotations[0].text
+    assert "not measured yet" in editing.seams_plot({FLAGSHIP: None}).layout.annotations[0].text
 
 
 def test_strips_are_pictures() -> None:
-    picture = editing.edit_strip({LITE: edits()}, "inpaint")
+    picture = editing.edit_strip({FLAGSHIP: edits()}, "inpaint")
     assert isinstance(picture, editing.Picture) and picture._repr_png_().startswith(b"\x89PNG")
-    assert editing.edit_strip({LITE: edits()}, "suffix") == "no example of suffix is stored"
-    assert "not measured yet" in str(editing.edit_strip({LITE: None}, "inpaint"))
-    made = Result("strips", "", facts(LITE), [{"prompt": "p", "known": True, "motion": packed(np.zeros((40, 22, 3)))}])
-    assert editing.prompts_of({LITE: made, FLAGSHIP: None}) == [("p", True)]
-    assert "not measured yet" in str(editing.prompt_strip({LITE: made}, "another prompt"))
+    assert editing.edit_strip({FLAGSHIP: edits()}, "suffix") == "no example of suffix is stored"
+    assert "not measured yet" in str(editing.edit_strip({FLAGSHIP: None}, "inpaint"))
+    made = Result(
+        "strips", "", facts(FLAGSHIP), [{"prompt": "p", "known": True, "motion": packed(np.zeros((40, 22, 3)))}]
+    )
+    assert editing.prompts_of({FLAGSHIP: made, BASE: None}) == [("p", True)]
+    assert "not measured yet" in str(editing.prompt_strip({FLAGSHIP: made}, "another prompt"))
 
 
 def test_seconds_a_motion() -> None:
     machine = {"processor": "a chip", "device": "cpu", "threads": 1, "cores": 2, "load": 0.5, "torch": "2"}
     rows = [{"what": "text to motion", "seconds": entry(0.5), "median": 0.45, "best": 0.4}]
-    results = {LITE: Result("inference_time", "", facts(LITE, machine=machine, frames=196), rows), FLAGSHIP: None}
+    results = {FLAGSHIP: Result("inference_time", "", facts(FLAGSHIP, machine=machine, frames=196), rows), BASE: None}
     table = timing.table9(results)
-    assert cells(table, "LG-Tok lite")["median, s"] == "0.450" and "196 frames on a chip" in table.caption
+    assert cells(table, "LG-Tok")["median, s"] == "0.450" and "196 frames on a chip" in table.caption
     (bars,) = timing.times_plot(results).data
-    assert dict(zip(bars.y, bars.x, strict=True))["LG-Tok lite, here"] == 0.5
+    assert dict(zip(bars.y, bars.x, strict=True))["LG-Tok, here"] == 0.5
     assert list(bars.x) == sorted(bars.x) and dict(zip(bars.y, bars.x, strict=True))["MARDM"] == 2.109

@@ -13,7 +13,7 @@ TOP = "r_precision_top3_pool32"
 def swept() -> Result:
     rows = [{"g": g, "fid": {"mean": 1 + (g - 2) ** 2, "ci95": 0.1, "n": 5}, TOP: {"mean": 0.5 + g / 20, "ci95": 0.02}}
             for g in (0.0, 1.0, 2.0, 3.0)]  # fmt: skip
-    facts = {"system": "lgtok-lite", "data": "made up", "split": "test", "n": 40, "repeats": 5, "seed": 0}
+    facts = {"system": "lgtok", "data": "made up", "split": "test", "n": 40, "repeats": 5, "seed": 0}
     return Result("guidance_sweep", "a test", facts, rows, {"real": {"fid": {"mean": 0.2, "ci95": 0.0}}})
 
 

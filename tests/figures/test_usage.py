@@ -47,7 +47,7 @@ def test_a_scale_that_is_not_there_is_refused(scale: int) -> None:
 
 def test_panels_of_one_system_have_one_curve_a_scale() -> None:
     found = usage()
-    figure = usage_panels({"lgtok-lite": found}, (1, 3, 4), caption="seed 0")
+    figure = usage_panels({"lgtok": found}, (1, 3, 4), caption="seed 0")
     assert len(figure.data) == 3
     assert len({trace.line.color for trace in figure.data}) == 3
     for n, trace in enumerate(figure.data):
@@ -72,7 +72,7 @@ def test_panels_need_systems_of_equal_scales() -> None:
 
 def test_summary_shows_both_shares() -> None:
     found = usage()
-    figure = usage_summary({"lgtok-lite": found}, (1, 3, 4))
+    figure = usage_summary({"lgtok": found}, (1, 3, 4))
     np.testing.assert_allclose(figure.data[0].y, 100 * found.used_, atol=1e-3)
     np.testing.assert_allclose(figure.data[1].y, 100 * found.perplexity_ / [5, 9, 12], atol=1e-3)
 

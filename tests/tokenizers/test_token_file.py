@@ -14,7 +14,7 @@ from playground.tokenizers.token_file import LevelTokens, TokenFile
 
 GOOD = {
     "format": 1,
-    "system": "lgtok-lite",
+    "system": "lgtok",
     "checkpoint": "abc",
     "caption": "a person hops",
     "frames": 40,

@@ -1,5 +1,6 @@
 """The refit of a detokenizer: tokens stay the same, the detokenizer alone moves, drawn tokens keep what is true."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from playground.training import configs, run
 from playground.training.configs import GeneratorTraining, RefitTraining, Schedule, TokenizerTraining
 from playground.training.loop import Launch
 from playground.training.refit import REFIT, build_refit_bank, velocity_loss
+from playground.training.tokenizer import JUMP, jump_loss
 from tests.conftest import drifting
 from tests.tiny import TINY, TINY_GENERATOR
 
@@ -68,6 +70,20 @@ def test_only_the_detokenizer_moves_and_the_pair_belongs_together(trained):
     assert all(torch.equal(same[name], copied[name]) for name in same)
 
 
+def test_a_refit_can_add_convolutions_between_patches(trained, monkeypatch):
+    path, out = trained
+    monkeypatch.setitem(configs.REFITS, "tiny-refit", replace(configs.REFITS["tiny-refit"], seam=6))
+    before, _ = load_tokenizer(out / "refit" / "tokenizer" / "checkpoint.safetensors")
+    shutil.rmtree(out / "refit")
+    run.train("tiny-refit", path, out, launch=CPU)
+    after, card = load_tokenizer(out / "refit" / "tokenizer" / "checkpoint.safetensors")
+    assert card.config == replace(before.config, seam=6)
+    assert any(weight.abs().sum() > 0 for weight in after.seams.layers[-1].parameters())  # no longer nothing
+    features, lengths = torch.randn(2, 40, TINY.columns), torch.tensor([40, 37])
+    ids = [model.encode(features, lengths, None).tokens.ids for model in (before, after)]
+    assert all(torch.equal(a, b) for a, b in zip(*ids, strict=True))
+
+
 def test_drawn_tokens_are_true_up_to_a_scale_and_possible_after_it(trained):
     path, out = trained
     library = Library.open(path)
@@ -108,3 +124,19 @@ def test_the_velocity_loss_is_that_of_a_loop():
                 part += 0.5 * error**2 if error < 1 else error - 0.5
             total += part / 5
     assert float(velocity_loss(out, features, lengths, 12.0)) == pytest.approx(total / 12.0, rel=1e-5)
+
+
+def test_the_loss_on_jumps_is_that_of_a_loop():
+    rng = torch.Generator().manual_seed(2)
+    out, features = (torch.randn(3, 7, 5, generator=rng) * scale for scale in (0.01, 0.02))
+    lengths = torch.tensor([7, 4, 2])  # two rows have no second difference
+    total = 0.0
+    for row, length in enumerate(lengths.tolist()):
+        for frame in range(2, length):
+            for column in range(5):
+                made, real = (rows[row, frame - 2 : frame + 1, column].tolist() for rows in (out, features))
+                error = abs(made[2] - 2 * made[1] + made[0] - (real[2] - 2 * real[1] + real[0]))
+                total += (0.5 * error**2 / JUMP if error < JUMP else error - 0.5 * JUMP) / 5
+    assert float(jump_loss(out, features, lengths, 12.0)) == pytest.approx(total / 12.0, rel=1e-5)
+    moved = out + torch.linspace(0.0, 3.0, 7)[:, None]  # steadily away from the truth: no jump
+    assert float(jump_loss(moved, out, lengths, 12.0)) == pytest.approx(0.0, abs=1e-6)

@@ -50,7 +50,7 @@ def tokens(seed: int) -> tuple[LevelTokens, ...]:
 
 @lru_cache(maxsize=4)
 def stored_analysis(
-    system: str = "lgtok-lite", sizes: tuple[int, ...] = SIZES, codes: tuple[int, ...] = CODES, frames: int = 80
+    system: str = "lgtok", sizes: tuple[int, ...] = SIZES, codes: tuple[int, ...] = CODES, frames: int = 80
 ) -> Bundle:
     """A map of 90 clips in three groups with random tokens."""
     rng = np.random.default_rng(5)
@@ -100,7 +100,7 @@ class FakeEngine(Drawing, Studies, Endless):
     def systems(self) -> list[SystemInfo]:
         facts: dict[str, Any] = {}
         name, text = "LG-Tok transformer", "minilm"
-        own = SystemInfo("lgtok-lite", "LG-Tok lite", "lgtok", name, "sar", text, 13_000_000, "none", "shipped", facts)
+        own = SystemInfo("lgtok", "LG-Tok", "lgtok", name, "sar", text, 13_000_000, "none", "shipped", facts)
         other = replace(own, name=DENOISER, title="MDM with CASIM, decoder", family="mdm", tokenizer=None)
         rows = [SYSTEMS[one] for one in self.others]
         more = [
@@ -138,11 +138,11 @@ class FakeEngine(Drawing, Studies, Endless):
             for n, motion in enumerate(motions())
         ]
 
-    def tokenize(self, motion: Motion, caption: str = "", system: str = "lgtok-lite") -> Tokenized:
+    def tokenize(self, motion: Motion, caption: str = "", system: str = "lgtok") -> Tokenized:
         self.calls.append("tokenize")
         caption = normalise(caption, what="caption", allow_empty=True)
         _, cut = prepare(motion)
-        own = "" if system == "lgtok-lite" else system
+        own = "" if system == "lgtok" else system
         levels = tokens(zlib.crc32(cut.joints.tobytes() + f"{caption}{own}".encode()))
         scale = np.linspace(1, 0.2, len(SIZES))[:, None, None]
         per_level = (np.random.default_rng(0).normal(size=(len(SIZES), 36, 16)) * scale).astype(np.float32)
@@ -166,7 +166,7 @@ class FakeEngine(Drawing, Studies, Endless):
         return Decoded(motion, _features(motion), None, guidance, len(file.levels), 0.04)
 
     def generate_steps(
-        self, prompt: str | None, seconds: float, system: str = "lgtok-lite", seed: int = 0, guidance: float = 2.0,
+        self, prompt: str | None, seconds: float, system: str = "lgtok", seed: int = 0, guidance: float = 2.0,
         cfg: float = 4.0, temperature: float = 1.0, top_k: float = 0.2, top_p: float = 0.95, **rest: Any,
     ) -> Iterator[GenerationStep]:  # fmt: skip
         self.calls.append("generate")

@@ -69,7 +69,7 @@ class Drawing:
 
     def edit(
         self, source: Any, span: Sequence[int] | None, prompt: str | None, seed: int = 0, kind: str = "inpaint",
-        system: str = "lgtok-lite", caption: str | None = None, anchor: str = "place", **options: Any,
+        system: str = "lgtok", caption: str | None = None, anchor: str = "place", **options: Any,
     ) -> Edited:  # fmt: skip
         used = system if isinstance(source, Motion) else source.system
         self.calls.append(f"edit {kind} {span} {prompt} {seed} {used}")

@@ -113,9 +113,9 @@ class Studies:
         nearest_clips = ("c3", "c0", "c6")
         if each == "clip":
             at = np.array([1.5, 2.5], np.float32)
-            return Placed("lgtok-lite", "fake00000000", each, at, at[::-1].copy(), nearest_clips, 0.03)
+            return Placed("lgtok", "fake00000000", each, at, at[::-1].copy(), nearest_clips, 0.03)
         spots = np.random.default_rng(4).normal(size=(sum(level.size for level in result.levels), 2))
-        return Placed("lgtok-lite", "fake00000000", each, spots.astype(np.float32), -spots.astype(np.float32), (), 0.05)
+        return Placed("lgtok", "fake00000000", each, spots.astype(np.float32), -spots.astype(np.float32), (), 0.05)
 
 
 def _some_other(level: LevelTokens, share: int) -> LevelTokens:

@@ -49,8 +49,8 @@ def tracks(services: Services, held: Session) -> list[str]:
 def test_every_system_has_a_figure_with_its_own_error_and_a_track(services: Services, do: Handlers) -> None:
     held = do.join(["momask", "mogo"], None)[0]
     stage = stage_of(services, held)
-    assert tracks(services, held) == ["lgtok-lite", "momask", "mogo"]
-    assert [figure["name"] for figure in stage["figures"]] == ["Original", "LG-Tok lite", "Momask", "Mogo"]
+    assert tracks(services, held) == ["lgtok", "momask", "mogo"]
+    assert [figure["name"] for figure in stage["figures"]] == ["Original", "LG-Tok", "Momask", "Mogo"]
     assert {figure["frames"] for figure in stage["figures"]} == {held.tokenized.motion.frames}
     for name, figure in zip(("momask", "mogo"), stage["figures"][2:], strict=True):
         found = held.found.beside[name]
@@ -67,21 +67,21 @@ def test_tokens_are_made_once_and_stay_while_scales_change(services: Services, d
     held = do.rebuild(3, "upto", held)[0]
     held = do.join(["momask", "mogo"], held)[0]
     assert engine.calls.count("tokenize") == 1  # type: ignore[attr-defined]
-    assert tracks(services, do.join([], held)[0]) == ["lgtok-lite"]
+    assert tracks(services, do.join([], held)[0]) == ["lgtok"]
 
 
 def test_others_follow_to_another_motion_and_system(services: Services, do: Handlers) -> None:
     held = do.join(["momask"], None)[0]
     other = services.examples()[-1].id
     held = do.choose(other, held)[0]
-    assert held.example == other and tracks(services, held) == ["lgtok-lite", "momask"]
+    assert held.example == other and tracks(services, held) == ["lgtok", "momask"]
     held = do.change("mogo", held)[0]
     assert tracks(services, held) == ["mogo", "momask"]
     assert tracks(services, do.change("momask", held)[0]) == ["momask"]  # not beside itself
 
 
 def test_what_is_not_here_or_too_many_is_left_out(services: Services) -> None:
-    assert beside_it(services, ["mdm", "lgtok", "momask", "momask", 3, "nonsense"]) == ("momask",)
+    assert beside_it(services, ["mdm", "lgtok-lite", "momask", "momask", 3, "nonsense"]) == ("momask",)
     assert beside_it(services, OTHERS) == OTHERS[:MOST]
 
 
@@ -95,12 +95,12 @@ def test_only_tokens_of_the_system_are_taken_apart(services: Services, do: Handl
 
     with pytest.raises(PlaygroundError, match="a token of Momask; choose Momask under System"):
         select("momask")
-    assert tracks(services, select("lgtok-lite")[0]) == ["lgtok-lite", "momask"]
+    assert tracks(services, select("lgtok")[0]) == ["lgtok", "momask"]
 
 
 def test_a_link_brings_them_along(services: Services, do: Handlers) -> None:
-    state = parse("?room=tokenize&system=mogo&beside=momask,mdm,lgtok-lite")
+    state = parse("?room=tokenize&system=mogo&beside=momask,mdm,lgtok")
     held = do.arrive(None, SimpleNamespace(query=query(state)))[0]  # type: ignore[arg-type]
-    assert tracks(services, held) == ["mogo", "momask", "lgtok-lite"]
+    assert tracks(services, held) == ["mogo", "momask", "lgtok"]
     script = python_for("tokenize", state.with_values(motion="clip-walk", caption="x"))
-    assert "for name in ['momask', 'mdm', 'lgtok-lite']:" in script
+    assert "for name in ['momask', 'mdm', 'lgtok']:" in script

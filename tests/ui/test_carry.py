@@ -25,7 +25,7 @@ CARRIED = [
     ("?room=tokenize&motion=m2&caption=some+words", {"motion": "m2", "caption": "some words"}),
     ("?room=embedding-map&motion=c7", {"vary": "scales", "motion": "c7"}),
     ("?room=embedding-map&motion=c7&place=m1", {"motion": "m1"}),
-    ("?room=codebooks&code=lgtok-lite.3.4", {"vary": "scales"}),
+    ("?room=codebooks&code=lgtok.3.4", {"vary": "scales"}),
     ("?room=generate&prompt=a+b&seed=4&seconds=3", {"vary": "s", "prompt": "a b", "seed": 4, "seconds": 3.0}),
     ("?room=generate&prompt=a+b&seed=4&takes=3", {"vary": "seed", "values": "4_5_6", "prompt": "a b"}),
     ("?room=generate&prompt=a+b&seed=40&takes=3", {"vary": "s", "seed": 40}),
@@ -102,4 +102,4 @@ def test_the_system_of_the_room_goes_on(address: str, system: str | None) -> Non
     state, held = compared_with(services, parse(address)), Held()
     assert state.system == system
     list(Handlers(services).arrive(held, SimpleNamespace(query=query(state))))  # type: ignore[arg-type]
-    assert {one.setting.system for one in held.done} == {system or "lgtok-lite"}
+    assert {one.setting.system for one in held.done} == {system or "lgtok"}

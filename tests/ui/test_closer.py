@@ -43,7 +43,7 @@ def event(**values: Any) -> Any:
 
 
 def chosen(scale: int, position: int) -> Any:
-    return event(selection={"system": "lgtok-lite", "scale": scale, "position": position})
+    return event(selection={"system": "lgtok", "scale": scale, "position": position})
 
 
 def selected(closer: Closer, scale: int = 5, position: int = 2) -> tuple[Any, ...]:

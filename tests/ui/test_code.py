@@ -30,7 +30,7 @@ NO_SCRIPT = {"learn"}
 @pytest.fixture(scope="module")
 def services() -> Services:
     engine = default_engine()
-    needed = [checkpoint_path(engine.assets, "lgtok-lite", part) for part in ("tokenizer", "generator")]
+    needed = [checkpoint_path(engine.assets, "lgtok", part) for part in ("tokenizer", "generator")]
     if not all(path.is_file() for path in needed):
         pytest.skip("no trained system is shipped with this copy")
     return Services(default_engine)
@@ -67,7 +67,7 @@ def test_tokenize(services: Services, tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_closer_looks(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    query = "?room=tokenize&motion=synthetic-kick&selection=lgtok-lite.4.1&code=7&wrong=a+person+%22sits%22"
+    query = "?room=tokenize&motion=synthetic-kick&selection=lgtok.4.1&code=7&wrong=a+person+%22sits%22"
     state, left = run(services, query, tmp_path, monkeypatch)
     engine = default_engine()
     tokens = engine.tokenize(services.example_motion(state["motion"]), state["caption"], str(state.system))
@@ -89,7 +89,7 @@ def test_generate(services: Services, tmp_path: Path, monkeypatch: pytest.Monkey
     query = "?room=generate&prompt=someone+%22waves%22&seed=7&seconds=2.4&temperature=0.85&topk=0.33&g=1.5&s=2.5"
     _, left = run(services, query, tmp_path, monkeypatch)
     made = default_engine().generate(
-        'someone "waves"', 2.4, "lgtok-lite", seed=7, guidance=1.5, cfg=2.5, temperature=0.85, top_k=0.33
+        'someone "waves"', 2.4, "lgtok", seed=7, guidance=1.5, cfg=2.5, temperature=0.85, top_k=0.33
     )
     assert ids(left["made"].levels) == ids(made.levels)
     assert (tmp_path / "generated.bvh").stat().st_size > 1_000
@@ -97,7 +97,7 @@ def test_generate(services: Services, tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_generate_plants_feet_where_the_switch_says_so() -> None:
     given = {"prompt": "a person sits", "g": 0, "s": 4, "temperature": 1, "topk": 0.5, "topp": 0.5}
-    given |= {"system": ("lgtok-lite",)}
+    given |= {"system": ("lgtok",)}
     code = python_for("generate", State("generate", {**given, "seed": 1, "seconds": 2.0, "plant": True}))
     assert code.count("made = engine.refine(made)") == 1
     assert code.index("engine.generate(") < code.index("engine.refine(") < code.index("write_motion(made.motion")
@@ -106,7 +106,7 @@ def test_generate_plants_feet_where_the_switch_says_so() -> None:
 
 def test_generate_without_a_prompt(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, left = run(services, "?room=generate&free=1&seconds=2&seed=3", tmp_path, monkeypatch)
-    assert ids(left["made"].levels) == ids(default_engine().generate(None, 2.0, "lgtok-lite", seed=3).levels)
+    assert ids(left["made"].levels) == ids(default_engine().generate(None, 2.0, "lgtok", seed=3).levels)
 
 
 def test_guidance(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,7 +120,7 @@ def test_guidance(services: Services, tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_embedding_map(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    bundle = services.bundle("lgtok-lite")
+    bundle = services.bundle("lgtok")
     row = len(bundle) // 2
     _, left = run(services, f"?room=embedding-map&motion={bundle.ids[row]}", tmp_path, monkeypatch)
     assert ids(left["tokens"].levels) == ids(bundle.levels(row)) and left["row"] == row
@@ -129,7 +129,7 @@ def test_embedding_map(services: Services, tmp_path: Path, monkeypatch: pytest.M
 
 def test_codebooks(services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, left = run(services, "?room=codebooks&order=index", tmp_path, monkeypatch)
-    bundle = services.bundle("lgtok-lite")
+    bundle = services.bundle("lgtok")
     assert len(left["frequencies"]) == len(bundle.sizes)
     for scale, found in enumerate(left["frequencies"]):
         assert np.array_equal(found, bundle.usage.relative(scale, "index"))
@@ -139,12 +139,12 @@ def test_a_script_stands_on_its_own(services: Services, tmp_path: Path) -> None:
     """In a process of its own, as a person runs it."""
     code = script(services, "?room=codebooks")["code"]
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.count("scale ") == len(services.bundle("lgtok-lite").sizes)
+    assert done.stdout.count("scale ") == len(services.bundle("lgtok").sizes)
 
 
 @given(st.text(max_size=80))
 def test_no_text_breaks_out_of_its_literal(text: str) -> None:
-    given = {"prompt": text, "free": False, "system": ("lgtok-lite",), "g": 1.0, "s": 1.0, "temperature": 1.0}
+    given = {"prompt": text, "free": False, "system": ("lgtok",), "g": 1.0, "s": 1.0, "temperature": 1.0}
     code = python_for("generate", State("generate", {**given, "topk": 0.5, "topp": 0.5, "seed": 1, "seconds": 2.0}))
     import ast
 

@@ -20,7 +20,7 @@ from tests.ui.test_code import ids, run
 @pytest.fixture(scope="module")
 def services() -> Services:
     engine = default_engine()
-    if not all(checkpoint_path(engine.assets, "lgtok-lite", part).is_file() for part in ("tokenizer", "generator")):
+    if not all(checkpoint_path(engine.assets, "lgtok", part).is_file() for part in ("tokenizer", "generator")):
         pytest.skip("no trained system is shipped with this copy")
     return Services(default_engine)
 

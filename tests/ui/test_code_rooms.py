@@ -28,8 +28,8 @@ Check = Callable[[Services, State, Left], None]
 @pytest.fixture(scope="module")
 def services() -> Services:
     engine = default_engine()
-    needed = [checkpoint_path(engine.assets, "lgtok-lite", part) for part in ("tokenizer", "generator")]
-    if not all(path.is_file() for path in needed) or not (engine.assets / "analysis" / "lgtok-lite.npz").is_file():
+    needed = [checkpoint_path(engine.assets, "lgtok", part) for part in ("tokenizer", "generator")]
+    if not all(path.is_file() for path in needed) or not (engine.assets / "analysis" / "lgtok.npz").is_file():
         pytest.skip("no trained system is shipped with this copy")
     return Services(default_engine)
 
@@ -56,7 +56,7 @@ def placed_like(result: Any, left: Left) -> None:
 
 
 def map_of_an_example(services: Services, state: State, left: Left) -> None:
-    bundle, example = services.bundle("lgtok-lite"), services.example("synthetic-bow")
+    bundle, example = services.bundle("lgtok"), services.example("synthetic-bow")
     assert left["row"] == bundle.position(str(state["motion"])) and ids(left["tokens"].levels) == ids(
         bundle.levels(left["row"])
     )
@@ -64,7 +64,7 @@ def map_of_an_example(services: Services, state: State, left: Left) -> None:
 
 
 def map_of_a_prompt(services: Services, state: State, left: Left) -> None:
-    placed_like(default_engine().generate('a person "bows"', SECONDS, "lgtok-lite", seed=SEED), left)
+    placed_like(default_engine().generate('a person "bows"', SECONDS, "lgtok", seed=SEED), left)
 
 
 def map_of_a_file(services: Services, state: State, left: Left) -> None:
@@ -74,17 +74,17 @@ def map_of_a_file(services: Services, state: State, left: Left) -> None:
 
 
 def codebooks(services: Services, state: State, left: Left) -> None:
-    usage, engine = services.bundle("lgtok-lite").usage, default_engine()
+    usage, engine = services.bundle("lgtok").usage, default_engine()
     assert [one.tolist() for one in left["frequencies"]] == [
         usage.relative(scale, "sorted").tolist() for scale in range(len(usage.used_))
     ]
-    like, stands_for = engine.neighbours("lgtok-lite", 4, 17), engine.prototype("lgtok-lite", 4, 17)
+    like, stands_for = engine.neighbours("lgtok", 4, 17), engine.prototype("lgtok", 4, 17)
     assert np.array_equal(left["like"].codes, like.codes) and np.array_equal(left["like"].similarity, like.similarity)
     assert np.allclose(left["prototype"].motion.joints, stands_for.motion.joints, atol=1e-5)
 
 
 def generate(services: Services, state: State, left: Left) -> None:
-    made = default_engine().generate_many("a person jumps", 2.0, "lgtok-lite", seeds=(5, 6))[1]
+    made = default_engine().generate_many("a person jumps", 2.0, "lgtok", seeds=(5, 6))[1]
     made = default_engine().regenerate(made, scale=7, seed=3)
     assert ids(left["made"].levels) == ids(made.levels)
 
@@ -126,7 +126,7 @@ def compare_edits(services: Services, state: State, left: Left) -> None:
 
 
 def compare_a_clip(services: Services, state: State, left: Left) -> None:
-    bundle = services.bundle("lgtok-lite")
+    bundle = services.bundle("lgtok")
     motion = default_engine().decode(bundle.token_file(3)).motion
     tokens = default_engine().tokenize(motion, bundle.clips[3].caption)
     assert ids(left["tokens"]["Scales 1 to 2"].levels) == ids(tokens.levels)
@@ -141,11 +141,11 @@ def endless(services: Services, state: State, left: Left) -> None:
 
 
 ADDRESSES: list[tuple[str, str, Check]] = [
-    ("tokenize", "motion=synthetic-kick&scales=only-3&selection=lgtok-lite.2.1&code=9&wrong=a+person+sits", tokenize),
+    ("tokenize", "motion=synthetic-kick&scales=only-3&selection=lgtok.2.1&code=9&wrong=a+person+sits", tokenize),
     ("embedding-map", "each=token&place=synthetic-bow", map_of_an_example),
     ("embedding-map", "prompt=a+person+%22bows%22", map_of_a_prompt),
     ("embedding-map", "place=file%3Amy+walk.npz", map_of_a_file),
-    ("codebooks", "k=5&code=lgtok-lite.4.17", codebooks),
+    ("codebooks", "k=5&code=lgtok.4.17", codebooks),
     ("generate", "prompt=a+person+jumps&seconds=2&seed=5&takes=2&take=1&changes=7.s3", generate),
     ("guidance", "motion=synthetic-run&caption=someone+hurries&g=3.5", guidance),
     ("edit", "motion=synthetic-kick&kind=suffix&from=0&to=1.5&prompt=a+person+bows&seed=2&measured=1", edit),
@@ -169,7 +169,7 @@ def test_the_script_gives_what_the_room_shows(
 ) -> None:
     if room == "endless" and not is_here(services):
         pytest.skip("the system of endless motion is not shipped with this copy")
-    query = query.replace(CLIP, services.bundle("lgtok-lite").ids[3])
+    query = query.replace(CLIP, services.bundle("lgtok").ids[3])
     np.savez(tmp_path / "my walk.npz", joints=drifting(400), fps=20.0)
     state, left = run(services, f"?room={room}&{query}", tmp_path, monkeypatch)
     check(services, state, left)

@@ -34,29 +34,29 @@ def event(**values: Any) -> Any:
 def test_the_room_opens_with_the_code_that_the_first_scale_uses_most(services: Services) -> None:
     view = codebooks.opening_view(services)
     counts = np.bincount(stored_analysis().tokens[:, 0], minlength=CODES[0])
-    assert view.controls["code"] == f"lgtok-lite.1.{counts.argmax()}"
+    assert view.controls["code"] == f"lgtok.1.{counts.argmax()}"
     assert "rank 1</strong>" in view.controls["card"] and view.kind == "stored"
     assert [len(view.stage[part]) for part in ("figures", "tracks")] == [1, 0]
 
 
 @pytest.mark.parametrize(("scale", "code"), [(1, 0), (4, 3), (10, 383)])
 def test_a_card_counts_what_the_clips_hold(do: codebooks.Handlers, scale: int, code: int) -> None:
-    _, card, kept = do.pick(event(id=f"lgtok-lite.{scale}.{code}"))
+    _, card, kept = do.pick(event(id=f"lgtok.{scale}.{code}"))
     start = sum(SIZES[: scale - 1])
     ids = stored_analysis().tokens[:, start : start + SIZES[scale - 1]]
     count = int((ids == code).sum())
-    assert kept == f"lgtok-lite.{scale}.{code}"
+    assert kept == f"lgtok.{scale}.{code}"
     assert (f"Used by {count} of {ids.size:,} tokens" in card) if count else ("Dead:" in card)
 
 
 def test_a_like_code_is_of_the_same_scale(do: codebooks.Handlers) -> None:
-    _, card, kept = do.pick(event(id="lgtok-lite.4.3"))
+    _, card, kept = do.pick(event(id="lgtok.4.3"))
     other = re.search(r'data-do="code" data-code="(\d+)"', card)
     assert other
-    assert do.act(kept, event(do="code", code=other[1], number=""))[2] == f"lgtok-lite.4.{other[1]}"
+    assert do.act(kept, event(do="code", code=other[1], number=""))[2] == f"lgtok.4.{other[1]}"
 
 
-NO_CODES = ["", "lgtok-lite", "lgtok-lite.0.1", "lgtok-lite.11.1", "lgtok-lite.1.128", "x.1.1", None]
+NO_CODES = ["", "lgtok", "lgtok.0.1", "lgtok.11.1", "lgtok.1.128", "x.1.1", None]
 
 
 @pytest.mark.parametrize("text", NO_CODES)
@@ -66,20 +66,20 @@ def test_what_is_no_code_is_refused(do: codebooks.Handlers, text: object) -> Non
 
 
 def test_curves_tell_which_code_was_clicked(services: Services) -> None:
-    figure = json.loads(codebooks.panels(services, codebooks.Wish(("lgtok-lite",), "sorted", 5)))
+    figure = json.loads(codebooks.panels(services, codebooks.Wish(("lgtok",), "sorted", 5)))
     for level, trace in enumerate(figure["data"], start=1):
         ids = [place for place, _ in trace["customdata"]]
-        assert sorted(ids) == sorted(f"lgtok-lite.{level}.{code}" for code in range(CODES[level - 1]))
+        assert sorted(ids) == sorted(f"lgtok.{level}.{code}" for code in range(CODES[level - 1]))
 
 
 def test_the_table_says_what_the_top_codes_cover(services: Services) -> None:
-    text = codebooks.scale_table(services, codebooks.Wish(("lgtok-lite",), "sorted", 7))
+    text = codebooks.scale_table(services, codebooks.Wish(("lgtok",), "sorted", 7))
     assert "top 7 cover" in text and "90 test clips of made up" in text and text.count("<tr>") == 11
 
 
 @pytest.mark.parametrize(
     ("systems", "order", "k"),
-    [([], "sorted", 5), (["lgtok"], "sorted", 5), (["lgtok-lite"], "up", 5), (["lgtok-lite"], "sorted", 0)],
+    [([], "sorted", 5), (["lgtok-lite"], "sorted", 5), (["lgtok"], "up", 5), (["lgtok"], "sorted", 0)],
 )
 def test_controls_out_of_bounds_are_refused(services: Services, systems: list[str], order: str, k: int) -> None:
     with pytest.raises(PlaygroundError):
@@ -87,9 +87,9 @@ def test_controls_out_of_bounds_are_refused(services: Services, systems: list[st
 
 
 def test_a_link_with_an_unknown_code_falls_back(do: codebooks.Handlers) -> None:
-    query = "?room=codebooks&order=index&k=3&code=lgtok-lite.1.9999"
+    query = "?room=codebooks&order=index&k=3&code=lgtok.1.9999"
     systems, order, k, *_, code = do.arrive(event(query=query))
-    assert (systems, order, k) == (["lgtok-lite"], "index", 3) and code == do.opening.controls["code"]
+    assert (systems, order, k) == (["lgtok"], "index", 3) and code == do.opening.controls["code"]
 
 
 def usage(counts: list[list[int]]) -> CodeUsage:

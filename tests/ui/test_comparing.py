@@ -34,8 +34,8 @@ class TwoSystems(FakeEngine):
 
     def systems(self) -> list[SystemInfo]:
         (first,) = super().systems()
-        return [first, replace(first, name="lgtok", title="LG-Tok", generator=None), replace(first, name="lgtok-mid",
-                title="LG-Tok mid", checkpoint="absent")]  # fmt: skip
+        lite = replace(first, name="lgtok-lite", title="LG-Tok lite", generator=None)
+        return [first, lite, replace(first, name="lgtok-mid", title="LG-Tok mid", checkpoint="absent")]
 
 
 @pytest.fixture
@@ -57,11 +57,11 @@ def test_systems_are_offered_as_soon_as_there_are_two(services: Services) -> Non
     engine = TwoSystems()
     two = Services(lambda: engine)  # type: ignore[arg-type, return-value]
     assert "system" in [key for _, key in offered(two)] and "maker" not in [key for _, key in offered(two)]
-    assert names(two, "system") == ["lgtok-lite", "lgtok"]
+    assert names(two, "system") == ["lgtok", "lgtok-lite"]
     settings = settings_of(two, "system", names(two, "system"), "x")
-    assert [one.system for one in settings] == ["lgtok-lite", "lgtok"]
+    assert [one.system for one in settings] == ["lgtok", "lgtok-lite"]
     view = compared_view(two, list(run(two, settings, motions()[0]))[-1], motions()[0], "a walk", 0)
-    assert [track["system"] for track in view.stage["tracks"]] == ["lgtok-lite", "lgtok"]
+    assert [track["system"] for track in view.stage["tracks"]] == ["lgtok", "lgtok-lite"]
 
 
 def test_a_copy_without_any_system_has_an_empty_room_and_no_error() -> None:
@@ -134,7 +134,7 @@ def test_the_best_is_the_least_as_it_is_written(services: Services) -> None:
 def test_the_table_marks_the_best_and_says_what_was_measured(services: Services) -> None:
     view = opening_view(services)
     table = view.controls["table"]
-    assert "<strong>" in table and "MPJPE" in table and "lgtok-lite" in table and "time of tokenizing" in table
+    assert "<strong>" in table and "MPJPE" in table and "lgtok" in table and "time of tokenizing" in table
     assert len(view.stage["figures"]) == 1 + len(names(services, "scales"))
     held = Held()
     *_, last = compare(services, held, "seed", ["0", "1"], "<b>sits", 2.0, 0, None)

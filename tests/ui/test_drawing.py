@@ -167,7 +167,7 @@ def test_the_name_of_a_made_motion_holds_its_system() -> None:
     assert read_name(name, "a person sits") == (named, (Change(4, 1, 5),)) and "_momask_4.1.5" in name
     assert made_again(services, name, "a person sits").system == "momask"
     plain = made_name(wish(), 3)
-    assert [made_again(services, plain, "x", usual).system for usual in ("", "momask")] == ["lgtok-lite", "momask"]
+    assert [made_again(services, plain, "x", usual).system for usual in ("", "momask")] == ["lgtok", "momask"]
 
 
 @pytest.mark.parametrize("name", ["made_", "made_1_2", "made_x_5_0_3_1_0.2_0.95", "walk", "made_1_5_0_3_1_0.2_0.95_z",
@@ -180,7 +180,7 @@ def test_other_names_are_refused_in_a_sentence(services: Services, name: str) ->
 def test_a_token_is_asked_about_forced_and_the_visit_remembers(services: Services) -> None:
     do, visit = Handlers(services), Visit()
     list(do.generate(visit, "a person sits", False, *NUMBERS, 1))
-    (card,) = do.token(visit, event(selection={"system": "lgtok-lite", "scale": 5, "position": 2}))
+    (card,) = do.token(visit, event(selection={"system": "lgtok", "scale": 5, "position": 2}))
     assert "scale 5, token 3 of 6" in card and "scales 1 to 4 stay" in card and card.count('data-do="code"') == 8
     do.choose(visit, event(code="201"))
     *_, last = do.redraw(visit)

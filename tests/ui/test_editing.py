@@ -94,7 +94,7 @@ def test_seams_say_where_how_much_and_of_what(services: Services) -> None:
     assert base is not None
     edited = services.engine().edit(base, (20, 40), "a person bows", seed=4)
     shown = seam_table(edited)
-    assert "1.00 s" in shown and "2.00 s" in shown and "seed 4" in shown and "lgtok-lite" in shown
+    assert "1.00 s" in shown and "2.00 s" in shown and "seed 4" in shown and "lgtok" in shown
 
 
 def test_a_generated_motion_comes_by_its_name_and_keeps_its_words(services: Services, do: Handlers) -> None:
@@ -174,7 +174,7 @@ def calls(do: Handlers) -> list[str]:
 
 
 def test_another_system_reads_the_same_motion_and_brings_its_own_numbers(several: Handlers) -> None:
-    assert [one.name for one in several.services.editors()] == ["lgtok-lite", "momask"]
+    assert [one.name for one in several.services.editors()] == ["lgtok", "momask"]
     held = several.choose("m2", "inpaint", EditSession())[0]
     shown = several.change("momask", "inpaint", held)
     session, own = shown[0], SYSTEMS["momask"].sampling
@@ -191,7 +191,7 @@ def test_a_link_names_the_system_and_one_that_cannot_gives_way_with_a_sentence(s
     assert shown[11] == "momask" and calls(several)[-1].endswith("2 momask") and shown[15:17] == (own.guidance, own.cfg)
     for name, title in (("lgtok-rvq", "LG-Tok with MoMask's quantizer"), ("mogo", "MOGO")):
         other = several.arrive(EditSession(), event(query=f"?room=edit&system={name}&motion=m1"))
-        assert other[11] == "lgtok-lite" and other[1].text == f"{title} cannot edit here; this is LG-Tok lite."
+        assert other[11] == "lgtok" and other[1].text == f"{title} cannot edit here; this is LG-Tok."
 
 
 def test_the_last_generation_brings_its_system(several: Handlers) -> None:
@@ -199,12 +199,12 @@ def test_the_last_generation_brings_its_system(several: Handlers) -> None:
     name = shown[6]
     assert shown[0].base.system == shown[11] == "momask" and name.endswith("_momask") and shown[1].text == ""
     assert shown[12:] == (SYSTEMS["momask"].sampling.guidance, SYSTEMS["momask"].sampling.cfg)
-    back = several.change("lgtok-lite", "inpaint", shown[0])
-    assert back[6] == name and back[0].base.system == "lgtok-lite" and calls(several)[-1] == "tokenize"
-    for system, source in (("momask", "made"), ("lgtok-lite", "made.motion")):
+    back = several.change("lgtok", "inpaint", shown[0])
+    assert back[6] == name and back[0].base.system == "lgtok" and calls(several)[-1] == "tokenize"
+    for system, source in (("momask", "made"), ("lgtok", "made.motion")):
         address = f"?room=edit&motion={name}&caption=someone+jogs&system={system}"
         again = several.arrive(EditSession(), event(query=address))
         assert again[0].base.system == system
         code = script(several.services, [address])["code"]
         assert 'system="momask",\n    seed=0' in code and f"engine.edit(\n    {source},\n" in code
-        assert ('system="lgtok-lite"' in code) == (system == "lgtok-lite")
+        assert ('system="lgtok"' in code) == (system == "lgtok")

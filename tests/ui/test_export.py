@@ -38,7 +38,7 @@ def figure(array: np.ndarray | None = None, **more: Any) -> dict[str, Any]:
 
 def track(**more: Any) -> dict[str, Any]:
     rows = [{"codes": codes, "ids": [0] * (size - 1) + [codes - 1]} for size, codes in zip(SIZES, CODES, strict=True)]
-    return {"system": "lgtok-lite", "frames": 96, "levels": rows, **more}
+    return {"system": "lgtok", "frames": 96, "levels": rows, **more}
 
 
 def detail(kind: str, query: str = "?room=generate&prompt=a+person+waves&seed=7", **more: Any) -> dict[str, Any]:
@@ -58,11 +58,11 @@ def test_a_motion_file_holds_the_motion(services: Services, tmp_path: Path, kind
 def test_tokens_come_with_caption_and_can_be_read_again(services: Services, tmp_path: Path) -> None:
     path, _ = write(read_wish(services, detail("json")), tmp_path)
     file = TokenFile.read(path)
-    assert (file.system, file.caption, file.frames) == ("lgtok-lite", "a person waves", 96)
+    assert (file.system, file.caption, file.frames) == ("lgtok", "a person waves", 96)
     assert [level.ids[-1] for level in file.levels] == [codes - 1 for codes in CODES]
     free = read_wish(services, detail("json", "?room=generate&free=1&prompt=x")).tokens
     assert free is not None and free.caption == ""
-    clip = services.bundle("lgtok-lite").clips[3]
+    clip = services.bundle("lgtok").clips[3]
     mapped = read_wish(services, detail("json", f"?room=embedding-map&motion={clip.id}")).tokens
     assert mapped is not None and mapped.caption == clip.caption
 

@@ -12,7 +12,7 @@ from tests.ui.double import FakeEngine
 def test_without_a_stored_sweep_one_sentence_says_so() -> None:
     engine = FakeEngine()
     figure, told = sweep(Services(lambda: engine))  # type: ignore[arg-type, return-value]
-    assert figure is None and told == "FID and R-Precision against g have not been measured for LG-Tok lite yet."
+    assert figure is None and told == "FID and R-Precision against g have not been measured for LG-Tok yet."
 
 
 def test_a_stored_sweep_says_what_it_was_measured_on() -> None:
@@ -24,7 +24,7 @@ def test_a_stored_sweep_says_what_it_was_measured_on() -> None:
 
 def test_a_broken_file_is_a_sentence_too() -> None:
     engine = FakeEngine()
-    path = engine.assets / "results" / "guidance_sweep-lgtok-lite.json"
+    path = engine.assets / "results" / "guidance_sweep-lgtok.json"
     path.parent.mkdir(parents=True)
     path.write_text("{}", encoding="utf-8")
     figure, told = sweep(Services(lambda: engine))  # type: ignore[arg-type, return-value]
@@ -35,11 +35,11 @@ def test_every_system_whose_decoder_reads_words_is_offered() -> None:
     engine = FakeEngine(others=("lgtok-mid", "momask"))
     write_result(swept(), engine.assets / "results")
     do = Handlers(Services(lambda: engine))  # type: ignore[arg-type, return-value]
-    assert [one.name for one in do.services.readers()] == ["lgtok-lite", "lgtok-mid"]
+    assert [one.name for one in do.services.readers()] == ["lgtok", "lgtok-mid"]
     stage, facts, _, curve, told = do.change("m1", "a person bows", 1.5, "lgtok-mid")
     assert '"lgtok-mid"' in stage.value and "system=lgtok-mid" in facts
     assert not curve["visible"] and "not been measured for LG-Tok mid" in told
-    assert do.change("m1", "a person bows", 1.5, "lgtok-lite")[3]["visible"]
+    assert do.change("m1", "a person bows", 1.5, "lgtok")[3]["visible"]
 
 
 def test_a_link_to_a_system_without_words_shows_another_one_and_says_so() -> None:
@@ -47,6 +47,6 @@ def test_a_link_to_a_system_without_words_shows_another_one_and_says_so() -> Non
     do = Handlers(Services(lambda: engine))  # type: ignore[arg-type, return-value]
     for name, words in (("momask", "MoMask has no decoder that reads words"), ("mogo", "MOGO is not shipped with")):
         shown = do.arrive(SimpleNamespace(query=f"?room=guidance&system={name}"))  # type: ignore[arg-type]
-        assert shown[2] == "lgtok-lite" and shown[3].text.startswith(words) and "this is LG-Tok lite" in shown[3].text
+        assert shown[2] == "lgtok" and shown[3].text.startswith(words) and "this is LG-Tok" in shown[3].text
     there = do.arrive(SimpleNamespace(query="?room=guidance&system=lgtok-mid"))  # type: ignore[arg-type]
     assert there[2] == "lgtok-mid" and there[3].text == ""

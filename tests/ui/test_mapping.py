@@ -19,7 +19,7 @@ from playground.ui.rooms import embedding
 from playground.ui.services import Services
 from tests.ui.double import SIZES, FakeEngine, stored_analysis
 
-SETTINGS = (["lgtok-lite"], "clip", "action", "tsne", "")
+SETTINGS = (["lgtok"], "clip", "action", "tsne", "")
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def event(**values: Any) -> Any:
 @pytest.mark.parametrize("each", ["clip", "token"])
 @pytest.mark.parametrize("colour", ["action", "scale", "time", "length", "source"])
 def test_every_colour_has_a_map(bundle: Bundle, each: str, colour: str) -> None:
-    shown = Shown(("lgtok-lite",), each, colour).checked()
+    shown = Shown(("lgtok",), each, colour).checked()
     assert shown.colour == (colour if each == "token" or colour not in ("scale", "time") else "action")
     figure = json.loads(mapping.maps([bundle], shown))
     count = len(bundle) if each == "clip" else len(bundle.token_index)
@@ -54,15 +54,15 @@ def test_every_colour_has_a_map(bundle: Bundle, each: str, colour: str) -> None:
 
 
 def test_a_token_is_coloured_by_its_place_in_time(bundle: Bundle) -> None:
-    values = mapping.colours_of(bundle, Shown(("lgtok-lite",), "token", "time"))["values"]
+    values = mapping.colours_of(bundle, Shown(("lgtok",), "token", "time"))["values"]
     for (_, scale, position), value in zip(bundle.token_index, values, strict=True):
         assert value == pytest.approx((position + 0.5) / SIZES[scale - 1])
 
 
 def test_several_systems_stand_side_by_side_on_one_kind_of_map(bundle: Bundle) -> None:
     other = replace(bundle, system="lgtok-mini")
-    made = mapping.clouds([bundle, other], Shown(("lgtok-lite", "lgtok-mini"), map="pca"), {})
-    assert [cloud.title.split(":")[0] for cloud in made] == ["LG-Tok lite", "LG-Tok mini, 104 tokens"]
+    made = mapping.clouds([bundle, other], Shown(("lgtok", "lgtok-mini"), map="pca"), {})
+    assert [cloud.title.split(":")[0] for cloud in made] == ["LG-Tok", "LG-Tok mini, 104 tokens"]
     assert all(np.array_equal(cloud.points, bundle.pca) for cloud in made) and made[0].ids == made[1].ids
 
 
@@ -100,7 +100,7 @@ def test_coordinates_are_those_of_the_maps(bundle: Bundle) -> None:
 
 
 def test_a_point_of_a_token_puts_its_clip_on_the_stage(do: embedding.Handlers) -> None:
-    stage, _, _, current = do.click(["lgtok-lite"], event(id="c7/5/3"))
+    stage, _, _, current = do.click(["lgtok"], event(id="c7/5/3"))
     assert current == "c7/5/3" and json.loads(stage)["scene"] == "c7"
 
 
@@ -109,10 +109,10 @@ def test_a_new_point_is_placed_and_stays_when_the_map_changes(do: embedding.Hand
     stars = [trace for trace in json.loads(plot)["data"] if trace["name"] == "yours"]
     assert [(trace["x"], trace["y"]) for trace in stars] == [([1.5], [2.5]), ([2.5], [1.5])]
     assert [id for _, id in near["choices"]] == ["c3", "c0", "c6"] and "placed in the map" in stage
-    plot = do.draw(["lgtok-lite"], "token", "scale", "tsne", "", held)[1]
+    plot = do.draw(["lgtok"], "token", "scale", "tsne", "", held)[1]
     stars = [trace for trace in json.loads(plot)["data"] if trace["name"] == "yours"]
     assert [len(trace["x"]) for trace in stars] == [sum(SIZES)] * 2
-    do.draw(["lgtok-lite"], "clip", "action", "tsne", "", held)
+    do.draw(["lgtok"], "clip", "action", "tsne", "", held)
     assert engine.calls.count("place clip") == 1 and engine.calls.count("tokenize") == 1
 
 
@@ -123,7 +123,7 @@ def test_a_generation_is_placed(do: embedding.Handlers, engine: FakeEngine) -> N
         do.place_prompt("  ", *SETTINGS, None)
 
 
-@pytest.mark.parametrize("bad", [(["lgtok"], "clip"), ([], "clip"), (["lgtok-lite"], "frame")])
+@pytest.mark.parametrize("bad", [(["lgtok-lite"], "clip"), ([], "clip"), (["lgtok"], "frame")])
 def test_settings_that_are_not_there_are_refused(do: embedding.Handlers, bad: tuple[list[str], str]) -> None:
     with pytest.raises(PlaygroundError):
         do.draw(*bad, "action", "tsne", "", None)
@@ -132,13 +132,13 @@ def test_settings_that_are_not_there_are_refused(do: embedding.Handlers, bad: tu
 @pytest.mark.parametrize(("group", "ids"), [("C", ["c1"]), ("A", "c1"), (None, [])])
 def test_a_group_that_is_none_is_refused(do: embedding.Handlers, group: object, ids: object) -> None:
     with pytest.raises(PlaygroundError, match="draw round"):
-        do.lasso(["lgtok-lite"], "clip", None, event(group=group, ids=ids))
+        do.lasso(["lgtok"], "clip", None, event(group=group, ids=ids))
 
 
 def test_a_link_shows_points_colour_and_a_new_point(do: embedding.Handlers) -> None:
     query = "?room=embedding-map&each=token&colour=scale&motion=c5&place=m1"
     systems, each, kind, held, plot, colour, *_, current, prompt = do.arrive(None, event(query=query))
-    assert (systems, each, kind, colour["value"], current) == (["lgtok-lite"], "token", "tsne", "scale", "c5")
+    assert (systems, each, kind, colour["value"], current) == (["lgtok"], "token", "tsne", "scale", "c5")
     assert prompt == ""
     assert held.guest is not None and '"yours"' in plot
     broken = do.arrive(None, event(query="?room=embedding-map&colour=time&motion=nobody&place=nobody"))

@@ -53,8 +53,8 @@ def test_a_standing_figure_keeps_its_height() -> None:
 def test_previews_hold_every_clip_and_go_with_their_checkpoints(
     services: Services, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bundle = services.bundle("lgtok-lite")
-    made = make_previews(services, "lgtok-lite")
+    bundle = services.bundle("lgtok")
+    made = make_previews(services, "lgtok")
     joints = np.frombuffer(base64.b64decode(made["joints"]), np.int8).reshape(-1, 22, 2)
     assert made["ids"] == list(bundle.ids) and len(joints) == sum(made["poses"])
     second = services.engine().decode(bundle.token_file(1)).motion

@@ -19,10 +19,10 @@ def with_systems(*systems: SystemInfo) -> Services:
 
 
 def test_rooms_show_the_usual_system_or_the_first_shipped_one_that_generates():
-    absent = replace(LITE, name="lgtok", checkpoint="absent")
+    absent = replace(LITE, name="lgtok-lite", checkpoint="absent")
     silent = replace(LITE, name="lgtok-rvq", generator=None, sampling=SamplingDefaults(guidance=1.0))
-    assert with_systems(absent, silent, LITE).default_system().name == "lgtok-lite"
-    assert with_systems(replace(LITE, name="mosa"), silent, LITE).default_system().name == "lgtok-lite"
+    assert with_systems(absent, silent, LITE).default_system().name == "lgtok"
+    assert with_systems(replace(LITE, name="mosa"), silent, LITE).default_system().name == "lgtok"
     assert with_systems(silent, replace(LITE, name="mosa")).default_system().name == "mosa"
     assert with_systems(absent, silent).default_system().name == "lgtok-rvq"
     assert with_systems(absent, silent).sampling().guidance == 1.0
@@ -32,5 +32,5 @@ def test_rooms_show_the_usual_system_or_the_first_shipped_one_that_generates():
 
 
 def test_rows_without_files_make_no_stored_result_stale():
-    absent = replace(LITE, name="lgtok", checkpoint="absent")
+    absent = replace(LITE, name="lgtok-lite", checkpoint="absent")
     assert with_systems(absent, LITE).fingerprint() == with_systems(LITE).fingerprint()

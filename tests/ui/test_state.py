@@ -26,7 +26,7 @@ from playground.ui.state import (
 )
 
 SYSTEM = next(iter(SYSTEMS))
-EXAMPLE = "?room=generate&prompt=a+person+waves&seed=7&system=lgtok-lite&hide=seed"
+EXAMPLE = "?room=generate&prompt=a+person+waves&seed=7&system=lgtok&hide=seed"
 
 
 def values_of(row: Control) -> st.SearchStrategy[object]:
@@ -61,7 +61,7 @@ def states(draw: st.DrawFn) -> State:
 def test_the_link_of_the_readme_means_what_it_says() -> None:
     state = parse(EXAMPLE)
     assert state.room == "generate" and state.hide == ("seed",)
-    assert (state["prompt"], state["seed"], state.system, state["seconds"]) == ("a person waves", 7, "lgtok-lite", 5.0)
+    assert (state["prompt"], state["seed"], state.system, state["seconds"]) == ("a person waves", 7, "lgtok", 5.0)
     assert parse(query(state)) == state
 
 
@@ -96,7 +96,7 @@ def test_any_values_of_known_keys_stay_inside_the_table(values: dict[str, str]) 
     "bad",
     ["seed=-1", "seed=99999999999", "seed=7.5", "seed=٣", "seed=1e3", "seconds=nan", "seconds=inf", "seconds=0.1",
      "seconds=1_0", "seconds=" + "9" * 300, "g=-0.01", "g=6.1", "free=yes", "system=../../etc", "system=",
-     "prompt=", "prompt=%00%00", "prompt=" + "a" * 501, "selection=lgtok-lite.0.1", "selection=nobody.1.1",
+     "prompt=", "prompt=%00%00", "prompt=" + "a" * 501, "selection=lgtok.0.1", "selection=nobody.1.1",
      "selection=9-3", "selection=1-2-3", "selection=1e3-5", "topk=0", "nothing=1", "prompt"],
 )  # fmt: skip
 def test_what_cannot_be_meant_is_as_good_as_absent(bad: str) -> None:

@@ -134,10 +134,10 @@ def test_another_system_brings_its_own_sampling(do: Handlers, engine: FakeEngine
     *values, switch = do.fill(visit, SimpleNamespace(query=f"?room=generate&system={DENOISER}&words=1"))  # type: ignore[arg-type]
     assert values[-1] == DENOISER and switch["value"] is True and visit.words
     gone = parse("?room=generate&system=mogo")
-    assert Wish.checked(*wish_values(do.services, gone)).system == "lgtok-lite"
+    assert Wish.checked(*wish_values(do.services, gone)).system == "lgtok"
     with gr.Blocks():
         system = controls(View(stage={}), do.services)[1]
-    assert system.visible and [name for _, name in system.choices] == ["lgtok-lite", DENOISER]
+    assert system.visible and [name for _, name in system.choices] == ["lgtok", DENOISER]
     engine.denoises = False
     with gr.Blocks():
         assert not controls(View(stage={}), do.services)[1].visible
@@ -146,8 +146,8 @@ def test_another_system_brings_its_own_sampling(do: Handlers, engine: FakeEngine
 def test_edit_reads_a_motion_without_tokens_as_tokens(do: Handlers) -> None:
     room = edit.Handlers(do.services, View(stage={}))
     shown = room.last(f"?room=generate&prompt=a+person+sits&system={DENOISER}", "inpaint", edit.EditSession())
-    assert shown[1].text == "MDM with CASIM, decoder writes no tokens; LG-Tok lite has read its motion as tokens."
-    assert shown[0].base.system == shown[11] == "lgtok-lite" and shown[6].endswith(f"_{DENOISER}")
+    assert shown[1].text == "MDM with CASIM, decoder writes no tokens; LG-Tok has read its motion as tokens."
+    assert shown[0].base.system == shown[11] == "lgtok" and shown[6].endswith(f"_{DENOISER}")
 
 
 def test_a_map_of_marks_alone_has_a_ramp_too() -> None:
@@ -159,10 +159,10 @@ def test_the_script_gives_the_map(real_services: Services, tmp_path: Path, monke
     query = "?room=generate&prompt=a+person+walks+and+then+waves&seconds=2&seed=7&words=1"
     _, left = run(real_services, query, tmp_path, monkeypatch)
     engine = default_engine()
-    found = engine.alignment(engine.generate("a person walks and then waves", 2.0, "lgtok-lite", seed=7))
+    found = engine.alignment(engine.generate("a person walks and then waves", 2.0, "lgtok", seed=7))
     np.testing.assert_array_equal(left["looked"].weights, found.weights)
     assert left["looked"].words == found.words and "waves" in found.words
     bare = {**parse(query).values, "g": 1.0, "s": 1.0, "temperature": 1.0, "topk": 0.5, "topp": 0.5}
-    bare |= {"system": ("lgtok-lite",)}
+    bare |= {"system": ("lgtok",)}
     assert "alignment" not in python_for("generate", State("generate", {**bare, "words": False}))
     assert "alignment" not in python_for("generate", State("generate", {**bare, "free": True}))

@@ -151,7 +151,7 @@ def opening_view(services: Services) -> View:
 
 
 def place_of(text: object) -> tuple[str, int, int]:
-    """("lgtok-lite", 5, 201) from "lgtok-lite.5.201". PlaygroundError for anything else."""
+    """("lgtok", 5, 201) from "lgtok.5.201". PlaygroundError for anything else."""
     system, *numbers = str(text).rsplit(".", 2)
     if len(numbers) != 2 or not all(number.isascii() and number.isdigit() and len(number) < 7 for number in numbers):
         raise PlaygroundError("choose a code by a click on a curve")

@@ -34,10 +34,10 @@ def payload(**settings: Any) -> scene.Json:
     short = [scene.level(np.array([1, 2, 3, 4]), 8), scene.level(None, 8, size=8)]
     figures = [
         scene.figure("original", "Original", walk()),
-        scene.figure("rebuilt", "LG-Tok", walk(shake=0.05), "lgtok-lite", "MPJPE 31 mm", ghost_of="original"),
+        scene.figure("rebuilt", "LG-Tok", walk(shake=0.05), "lgtok", "MPJPE 31 mm", ghost_of="original"),
     ]
     tracks = [
-        scene.track("lgtok-lite", "LG-Tok", FRAMES, rows, scene.NOT_FRAMES),
+        scene.track("lgtok", "LG-Tok", FRAMES, rows, scene.NOT_FRAMES),
         scene.track("momask-lite", "MoMask", 32, short),
     ]
     return scene.payload(figures, tracks, **settings)
@@ -59,7 +59,7 @@ def rich(**settings: Any) -> scene.Json:
     rows[2] = scene.level(IDS[2], CODES[2], marks=MARKED, entropy=np.linspace(0, np.log(CODES[2]), SIZES[2]))
     short = [scene.level(np.array([1, 2, 3, 4]), 8), scene.level(np.arange(8), 8)]
     tracks = [
-        scene.track("lgtok-lite", "LG-Tok", FRAMES, rows, scene.NOT_FRAMES, marked="differs without the caption"),
+        scene.track("lgtok", "LG-Tok", FRAMES, rows, scene.NOT_FRAMES, marked="differs without the caption"),
         scene.track("momask-lite", "MoMask", 32, short),
     ]
     strips = [
@@ -82,8 +82,8 @@ def guided() -> tuple[scene.Json, dict[str, np.ndarray]]:
     parts = {name: np.asarray(value, np.float32) for name, value in parts.items()}
     parts["conditional"][:, 0] += 2.0  # turns all the way
     figures = [
-        scene.figure("live", "Your g", None, "lgtok-lite", g="live", frames=FRAMES),
-        scene.figure("fixed", "g = 4", None, "lgtok-lite", g=4, frames=FRAMES),
+        scene.figure("live", "Your g", None, "lgtok", g="live", frames=FRAMES),
+        scene.figure("fixed", "g = 4", None, "lgtok", g=4, frames=FRAMES),
     ]
     return scene.payload(figures, features=scene.features("live", guidance=2.0, **parts)), parts
 

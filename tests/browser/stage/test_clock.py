@@ -133,7 +133,7 @@ def test_the_keys_walk_from_token_to_token(shown: Shown) -> None:
     shown.page.keyboard.press("Shift+ArrowDown")  # the middle of token 2 of 6 is token 5 of 12
     chosen = [detail for name, detail in shown.events() if name == "select"]
     places = [(detail["scale"], detail["position"]) for detail in chosen]
-    assert places == [(2, 1), (2, 2), (3, 5)] and {detail["system"] for detail in chosen} == {"lgtok-lite"}
+    assert places == [(2, 1), (2, 2), (3, 5)] and {detail["system"] for detail in chosen} == {"lgtok"}
     told = shown.page.locator(".ms-spoken").inner_text()
     assert f"code {IDS[2][5]} of {CODES[2]}" in told and "scale 3" in told
     shown.page.keyboard.press("2")

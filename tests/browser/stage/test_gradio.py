@@ -59,7 +59,7 @@ def test_commits_reach_python(page: Page) -> None:
     assert box is not None
     page.mouse.click(box["x"] + 20, box["y"] + 34)
     said = page.get_by_label("said")
-    expect(said).to_have_value("{'selection': {'system': 'lgtok-lite', 'scale': 1, 'position': 0}}")
+    expect(said).to_have_value("{'selection': {'system': 'lgtok', 'scale': 1, 'position': 0}}")
     assert str(IDS[0][0]) in page.locator(".ms-spoken").first.inner_text()
     page.keyboard.press("3")
     expect(said).to_have_value("{'scale': 3}")

@@ -11,7 +11,7 @@ from tests.browser.stage.scenes import CODES, FRAMES, IDS, SPANS, Shown, rich
 pytestmark = pytest.mark.browser
 Show = Callable[..., Shown]
 FOCUS = TOKENS["focus"][0]
-CHOSEN = {"system": "lgtok-lite", "scale": 2, "position": 4}
+CHOSEN = {"system": "lgtok", "scale": 2, "position": 4}
 LIT = (  # whether the moving canvas holds the focus colour near a place (track, level, frame)
     "const [track, level, frame, edge] = argument, { score } = stage;"
     "const row = score.laid.rows.find(r => r.track === track && r.level === level);"
@@ -106,7 +106,7 @@ def test_arrows_move_between_tokens_and_enter_chooses(linked: Shown) -> None:
     told = cursor(linked)
     assert told["named"] and f"code {IDS[1][1]} of {CODES[1]}" in told["text"]
     linked.page.keyboard.press("Enter")
-    chosen = {"system": "lgtok-lite", "scale": 2, "position": told["hover"]["position"]}
+    chosen = {"system": "lgtok", "scale": 2, "position": told["hover"]["position"]}
     assert linked.events() == [["select", chosen]] and linked.state("frame") == 0
     linked.page.keyboard.press("Enter")
     assert linked.events()[1:] == [["select", None]]

@@ -113,7 +113,7 @@ def test_the_empty_stage_says_what_to_do(shown: Shown) -> None:
 
 
 def test_one_more_scale_goes_on_where_it_was_another_motion_starts_anew(shown: Shown) -> None:
-    shown.call("stage.seek(21); stage.select({ system: 'lgtok-lite', scale: 2, position: 3 })")
+    shown.call("stage.seek(21); stage.select({ system: 'lgtok', scale: 2, position: 3 })")
     shown.call("stage.setPayload(argument)", payload())
     assert shown.state("frame") == 21 and shown.state("selection") is not None
     other = scene.payload([scene.figure("original", "Original", walk(30))])
@@ -136,7 +136,7 @@ def test_the_score_can_stand_elsewhere(shown: Shown) -> None:
         shown.page.locator("#below .ms-tracks").is_visible() and shown.page.locator("section .ms-tracks").count() == 0
     )
     shown.page.mouse.click(*shown.cell(0, 1, 2))
-    assert shown.events() == [["select", {"system": "lgtok-lite", "scale": 2, "position": 2}]]
+    assert shown.events() == [["select", {"system": "lgtok", "scale": 2, "position": 2}]]
 
 
 def test_in_a_notebook_it_lives_in_a_frame(browser: Browser) -> None:

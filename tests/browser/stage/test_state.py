@@ -42,9 +42,9 @@ def test_a_state_is_put_back_and_read_again(shown: Shown) -> None:
     "bad",
     [
         {"frame": "x", "scale": 99, "selection": {"system": "nobody", "scale": 1, "position": 0}, "span": [5, 2]},
-        {"frame": None, "scale": -1, "selection": {"system": "lgtok-lite", "scale": 1, "position": 9}, "speed": 1e9},
+        {"frame": None, "scale": -1, "selection": {"system": "lgtok", "scale": 1, "position": 9}, "speed": 1e9},
         {"frame": {}, "scale": "no", "mode": "sideways", "selection": 7, "span": [0, 999], "speed": "fast"},
-        {"selection": {"system": "lgtok-lite", "scale": 1, "position": 0.5}, "span": ["a", "b"]},
+        {"selection": {"system": "lgtok", "scale": 1, "position": 0.5}, "span": ["a", "b"]},
         {},
     ],
 )
@@ -106,7 +106,7 @@ def test_the_state_is_told_once_it_has_come_to_rest(shown: Shown) -> None:
     shown.call("stage.play()")
     shown.until("stage.state.frame > 12")
     assert shown.page.evaluate("() => window.told.length") == 0
-    shown.call("stage.pause(); stage.seek(30); stage.select({ system: 'lgtok-lite', scale: 2, position: 3 })")
+    shown.call("stage.pause(); stage.seek(30); stage.select({ system: 'lgtok', scale: 2, position: 3 })")
     shown.until("window.told.length")
     shown.drawn()
     told = shown.page.evaluate("() => window.told")

@@ -34,7 +34,7 @@ def test_a_click_selects_a_second_click_lets_go(shown: Shown) -> None:
     shown.page.mouse.click(*shown.cell(1, 0, 2))
     shown.page.mouse.click(*shown.cell(1, 0, 2))
     assert shown.events() == [
-        ["select", {"system": "lgtok-lite", "scale": 2, "position": 4}],
+        ["select", {"system": "lgtok", "scale": 2, "position": 4}],
         ["select", {"system": "momask-lite", "scale": 1, "position": 2}],
         ["select", None],
     ]
