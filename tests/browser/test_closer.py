@@ -98,7 +98,7 @@ def test_one_scale_alone_or_left_out(seen: Visit, words: str, tokens: str, text:
     page.get_by_role("radio", name=words, exact=True).check()
     expect(page.locator("#tokenize-facts")).to_contain_text(tokens)
     expect(page).to_have_url(re.compile(f"scales={text}"))
-    assert page.evaluate(STATE)["mode"] == words.split()[0]
+    page.wait_for_function(f"(word) => ({STATE})().mode === word", arg=words.split()[0])
 
 
 def test_what_the_words_do(seen: Visit) -> None:
