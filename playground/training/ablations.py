@@ -77,7 +77,7 @@ ROWS: tuple[Row, ...] = (
 
 
 def base(size: str) -> TokenizerTraining:
-    """What all rows share. cpu: some six minutes a core; gpu: the paper's tiny model with MiniLM text."""
+    """What all rows share. cpu: some eight minutes a core; gpu: the paper's tiny model with MiniLM text."""
     schedule = Schedule(steps=STEPS, rate=1e-3, warmup=200, save_every=250, validate_every=1_500)
     training = TokenizerTraining(
         model=TokenizerConfig(
