@@ -75,7 +75,8 @@ def test_a_copied_link_shows_the_same_in_a_fresh_profile(visit: Go, stand_in: st
     assert link == page.url
     other = visit(link).page
     expect(other.locator("#generate-prompt textarea")).to_have_value(PROMPT)
-    assert finished(other, "generate") == tokens
+    finished(other, "generate")
+    other.wait_for_function(f"(wish) => JSON.stringify(({TOKENS})('generate')) === wish", arg=dumped(tokens))
 
 
 def test_the_address_follows_without_asking_the_server(visit: Go, stand_in: str) -> None:
