@@ -43,7 +43,9 @@ def engine(tmp_path_factory: pytest.TempPathFactory) -> Engine:
 def visitor(browser: Browser, engine: Engine) -> Iterator[Visit]:
     """The one page of this file."""
     with serving("-m", "tests.ui.serve_systems", "{port}", str(engine.assets)) as address, visiting(browser) as go:
-        yield go(address)
+        seen = go(address)
+        seen.settle()
+        yield seen
 
 
 @pytest.fixture
