@@ -98,5 +98,6 @@ def test_the_command_writes_a_file_or_one_line(
     stored = json.loads(out.read_text())
     assert len(stored["rows"]) == 9 and str(tmp_path) not in out.read_text()
     assert stored["made_by"].startswith(f"python -m playground.evaluation.sweep --system {SYSTEM} --library library")
+    capsys.readouterr()  # progress, where that took long
     assert sweep.main([*call, "--library", str(tmp_path)]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
