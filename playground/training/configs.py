@@ -123,16 +123,15 @@ class RefitTraining:
     seed: int = 0
 
 
-REFITS: dict[str, RefitTraining] = {
-    "lgtok-refit": RefitTraining(
-        tokenizer_training=TOKENIZERS["lgtok-tokenizer"],
-        batch=BatchConfig(size=32, whole=0.8, source_balance=0.5, action_balance=0.3),
-        schedule=Schedule(steps=2_700, rate=5e-4, warmup=100, fall=0.5),
-        feet=0.1,  # this, the next and the last in the third round of the shipped one alone
-        smooth=1.0,
-        seam=96,
-    ),
-}
+def refit_of(tokenizer: TokenizerTraining, steps: int) -> RefitTraining:
+    """The refit that follows a tokenizer's training. The flagship's shipped one had feet, smooth and seam in its third
+    round alone."""
+    batch = replace(tokenizer.batch, whole=0.8, speed=0.0)
+    schedule = Schedule(steps=steps, rate=5e-4, warmup=100, fall=0.5)
+    return RefitTraining(tokenizer, batch, schedule, feet=0.1, smooth=1.0, seam=96)
+
+
+REFITS: dict[str, RefitTraining] = {"lgtok-refit": refit_of(TOKENIZERS["lgtok-tokenizer"], 2_700)}
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from playground.training.configs import (
     RefitTraining,
     Schedule,
     TokenizerTraining,
+    refit_of,
 )
 
 SIZES = ("cpu", "gpu")
@@ -49,7 +50,7 @@ _GENERATOR = GeneratorTraining(  # 1.6 M
     schedule=Schedule(steps=2_000, rate=1e-3, weight_decay=1e-5, clip=1.0, fall=0.35),
     keep=0.8,
 )
-_REFIT = Schedule(steps=2_000, rate=5e-4, warmup=100, fall=0.5)
+_REFIT = 2_000  # steps
 _LONG = Schedule(steps=4_000, rate=8e-4, save_every=1_000, validate_every=1_000)  # on a GPU
 
 # On a GPU the flagship has 13.2 M and 6.4 M numbers: 39 MB, close to the largest that it may have.
@@ -71,12 +72,6 @@ _GPU_GENERATOR = replace(
 )
 
 
-def refit(tokenizer: TokenizerTraining) -> RefitTraining:
-    """The refit that follows a tokenizer's training."""
-    batch = replace(tokenizer.batch, whole=0.8, speed=0.0)
-    return RefitTraining(tokenizer, batch, _REFIT, feet=0.1, smooth=1.0, seam=96)
-
-
 def compared(tokenizer: TokenizerTraining, generator: GeneratorTraining) -> Rows:
     """Every training of the systems that are compared with each other, the base first."""
     model = tokenizer.model
@@ -91,7 +86,7 @@ def compared(tokenizer: TokenizerTraining, generator: GeneratorTraining) -> Rows
     rows: Rows = {f"{name}-tokenizer": row for name, row in tokenizers.items()}
     drawn = [name for name in tokenizers if name != "lgtok-rvq"]  # plain residual levels: no scales to draw in turn
     rows |= {f"{name}-generator": replace(generator, tokenizer=f"{name}-tokenizer") for name in drawn}
-    return rows | {f"{name}-refit": refit(tokenizers[name]) for name in drawn}
+    return rows | {f"{name}-refit": refit_of(tokenizers[name], _REFIT) for name in drawn}
 
 
 def flagship(tokenizer: TokenizerTraining, generator: GeneratorTraining, again: RefitTraining) -> Rows:
@@ -102,7 +97,7 @@ def flagship(tokenizer: TokenizerTraining, generator: GeneratorTraining, again: 
 FAMILY: dict[str, Rows] = {
     "cpu": flagship(TOKENIZERS["lgtok-tokenizer"], GENERATORS["lgtok-generator"], REFITS["lgtok-refit"])
     | compared(_TOKENIZER, _GENERATOR),
-    "gpu": flagship(_GPU_TOKENIZER, _GPU_GENERATOR, refit(_GPU_TOKENIZER))
+    "gpu": flagship(_GPU_TOKENIZER, _GPU_GENERATOR, refit_of(_GPU_TOKENIZER, _REFIT))
     | compared(
         replace(_TOKENIZER, batch=_GPU_TOKENIZER.batch, schedule=_GPU_TOKENIZER.schedule),
         replace(_GENERATOR, schedule=_GPU_GENERATOR.schedule, size=128),

@@ -56,17 +56,21 @@ def tokenizer_loss(
 
 def velocity_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
     """smoothL1 on the differences of successive rows of out and features [B, F, C], over real rows; scalar."""
-    inside = torch.arange(1, features.shape[1], device=lengths.device)[None] < lengths[:, None]
-    error = F.smooth_l1_loss(out.diff(dim=1), features.diff(dim=1), reduction="none").mean(dim=-1)
-    return (error * inside).sum() / mean_frames
+    return _difference_loss(out, features, lengths, mean_frames, 1, 1.0)
 
 
 def jump_loss(out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float) -> Tensor:
     """smoothL1, straight beyond JUMP, on the second differences of rows of out and features [B, F, C], over real rows;
     scalar. Nearly straight everywhere, it minds the small jumps from patch to patch as much as the fast motions."""
-    inside = torch.arange(2, features.shape[1], device=lengths.device)[None] < lengths[:, None]
-    made, real = (rows.diff(n=2, dim=1) for rows in (out, features))
-    error = F.smooth_l1_loss(made, real, reduction="none", beta=JUMP).mean(dim=-1)
+    return _difference_loss(out, features, lengths, mean_frames, 2, JUMP)
+
+
+def _difference_loss(
+    out: Tensor, features: Tensor, lengths: Tensor, mean_frames: float, order: int, beta: float
+) -> Tensor:
+    inside = torch.arange(order, features.shape[1], device=lengths.device)[None] < lengths[:, None]
+    made, real = (rows.diff(n=order, dim=1) for rows in (out, features))
+    error = F.smooth_l1_loss(made, real, reduction="none", beta=beta).mean(dim=-1)
     return (error * inside).sum() / mean_frames
 
 

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from playground.engine import Engine
-from playground.systems import DEFAULT_SYSTEM, SYSTEMS
+from playground.systems import SYSTEMS
 from playground.ui.state import parse
 from tests.browser.conftest import Visit, visiting
 from tests.browser.server import serving
@@ -167,7 +167,7 @@ def test_g_acts_where_the_decoder_reads_words(page: Page, engine: Engine) -> Non
         shown(page, "guidance", f"track.system === '{name}' && data.figures.length === 6 && data.features")
     follow(page, "?room=guidance&system=momask")
     expect(page.locator("#guidance-message")).to_contain_text(f"MoMask {WORDLESS}")
-    expect(page.locator("#guidance-system input")).to_have_value(SYSTEMS[DEFAULT_SYSTEM].title)
+    expect(page.locator("#guidance-system input")).to_have_value("LG-Tok")
 
 
 @pytest.mark.parametrize("vary", ["system&values=momask_t2mgpt", "maker&values=momask_t2mgpt", "maker&values=mdm_mosa"])

@@ -13,7 +13,7 @@ from playground.evaluation import sweep
 from playground.evaluation.run import Order, evaluate
 from playground.evaluation.state import state_path
 from playground.evaluation.sweep import SCALES, guidance_sweep
-from playground.systems import checkpoint_path, row_of
+from playground.systems import checkpoint_path
 from tests.analysis.tiny import SYSTEM, same_numbers, tiny_assets, tiny_library
 from tests.evaluation.tiny import tiny_evaluator
 
@@ -56,7 +56,7 @@ def test_it_says_what_it_was_measured_on(swept: dict) -> None:
         2,
     )
     assert set(facts["evaluators"]) == {"tmr", "clip"} and "guidance" not in facts["sampling"]
-    assert facts["checkpoint"] and facts["generator"] and facts["own_guidance"] == row_of(SYSTEM).sampling.guidance
+    assert facts["checkpoint"] and facts["generator"] and facts["own_guidance"] == 1.0
     json.dumps(swept, allow_nan=False)
     assert SCALES == (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 
