@@ -27,6 +27,7 @@ from playground.training.run import Training
 
 CLIPS = 1_000  # of the training list, that most rows learn from
 SPLIT, SEED = "test", 0  # of the measurement
+LATER: dict[str, Any] = {"seam": 0}  # fields younger than the first stored rows: the value that changes nothing
 
 Facts = dict[str, Any]
 After = Callable[[Job], None]
@@ -66,9 +67,18 @@ class Table:
 
 
 def config_hash(training: Training, lender: Training | None = None) -> str:
-    """12 digits that change with any number of a training, or of that of the tokenizer which it draws from."""
-    told = [[type(one).__name__, asdict(one)] for one in (training, lender) if one is not None]
+    """12 digits that change with any number of a training, or of that of the tokenizer which it draws from.
+
+    A field of LATER at the value there is left out, so that rows stored before it came stay what they are.
+    """
+    told = [[type(one).__name__, _told(asdict(one))] for one in (training, lender) if one is not None]
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def _told(numbers: Facts) -> Facts:
+    """The numbers of a training, and of its model within, without those of LATER that change nothing."""
+    kept = {key: _told(value) if isinstance(value, dict) else value for key, value in numbers.items()}
+    return {key: value for key, value in kept.items() if key not in LATER or value != LATER[key]}
 
 
 def ablation_job(name: str, trainings: Mapping[str, Training], out: Path, about: Mapping[str, Any] = {}) -> Job:

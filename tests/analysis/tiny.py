@@ -13,7 +13,7 @@ from tests.conftest import drifting
 from tests.tiny import TINY, tiny_generator, tiny_tokenizer
 
 SCALES, CODES = TINY.scales, TINY.codes
-SYSTEM = "lgtok-lite"
+SYSTEM = "lgtok"
 PLAN = (  # source, split, action label, captions, poses
     ("A", "test", "walk|happy", ("someone walks to the left", "second"), 60),
     ("A", "test", "raise-up-left-hand", ("raises the left hand",), 61),

@@ -13,12 +13,13 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
+from playground.analysis.results import RESULTS
 from playground.data.library import LibraryClip, write_library
 from playground.errors import PlaygroundError
-from playground.training import record
+from playground.training import ablations, ablations_others, record
 from playground.training.configs import GeneratorTraining, TokenizerTraining
 from playground.training.queue import Job, Limits
-from playground.training.record import Record, Row, Table, ablation_job, config_hash, finished
+from playground.training.record import Record, Row, Table, ablation_job, config_hash, finished, judge
 from playground.training.run import Training
 from tests.conftest import drifting
 from tests.training.test_queue import GENERATOR, TOKENIZER
@@ -218,8 +219,15 @@ def test_a_hash_changes_with_every_number_and_with_the_tokenizer_of_a_generator(
         config_hash(replace(TOKENIZER, model=replace(TOKENIZER.model, depth=1))),
         config_hash(replace(TOKENIZER, schedule=replace(TOKENIZER.schedule, rate=2e-3))),
         config_hash(DRAWS, TOKENIZER), config_hash(DRAWS, replace(TOKENIZER, seed=1)),
+        config_hash(replace(TOKENIZER, model=replace(TOKENIZER.model, seam=8))),
     }  # fmt: skip
-    assert len(hashes) == 7 and all(len(one) == 12 for one in hashes)
+    assert len(hashes) == 8 and all(len(one) == 12 for one in hashes)
     assert isinstance(TRAININGS["base"], TokenizerTraining) and isinstance(TRAININGS["draws"], GeneratorTraining)
     jobs = {name: ablation_job(name, TRAININGS, Path("x"), {"size": "cpu"}) for name in TRAININGS}
     assert jobs["draws"].about["config"] == config_hash(DRAWS, TOKENIZER) and jobs["draws"].about["size"] == "cpu"
+
+
+@pytest.mark.parametrize("table", [ablations.table_of(Path("x"), "cpu"), ablations_others.table_of(Path("x"))])
+def test_every_shipped_row_still_holds(table: Table) -> None:
+    shipped = Record(table, None, judge(), RESULTS / f"{table.item}.json")
+    assert shipped.notes() == [] and len(shipped.kept()) > 1
