@@ -2,7 +2,8 @@
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -78,11 +79,17 @@ def fit(run: Fit) -> dict[str, Any]:
     A run whose deadline passes first saves its state and exports nothing; `resume` goes on with it.
     PlaygroundError if the folder holds a state and `resume` is not set.
     """
-    # The random state is the run's own, and a part of what is saved; the caller's is given back.
-    fabric = run.fabric
-    with torch.random.fork_rng(devices=[fabric.device] if fabric.device.type == "cuda" else []):
-        torch.manual_seed(run.seed + fabric.global_rank)
+    # The random state is the run's own, and a part of what is saved.
+    with seeded(run.seed + run.fabric.global_rank, run.fabric.device):
         return _fit(run)
+
+
+@contextmanager
+def seeded(seed: int, device: torch.device) -> Iterator[None]:
+    """Torch draws from `seed` within the block, on the CPU and on `device`; after it the caller's state is back."""
+    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
+        torch.manual_seed(seed)
+        yield
 
 
 def _fit(run: Fit) -> dict[str, Any]:

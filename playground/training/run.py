@@ -41,7 +41,7 @@ from playground.training.evaluator import EvaluatorTask
 from playground.training.family import FAMILY, SIZES
 from playground.training.features import FeatureTask
 from playground.training.generator import GeneratorTask, build_bank
-from playground.training.loop import Fit, Launch, Task, fit, start_fabric
+from playground.training.loop import Fit, Launch, Task, fit, seeded, start_fabric
 from playground.training.others import OTHERS
 from playground.training.refiner import RefinerTask
 from playground.training.refit import RefitTask, build_refit_bank
@@ -155,8 +155,7 @@ def _train_on_motions(config: TokenizerTraining | FeatureTraining, order: Order)
     texts = [*batches.captions(), *(caption for sample in held_out for caption in sample.captions), ""]
     store = FeatureStore.cached(order.library, texts, encoder)
     validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
-    with torch.random.fork_rng():
-        torch.manual_seed(config.seed)
+    with seeded(config.seed, fabric.device):
         model = build(fitted(config.model, text_width=encoder.width))
     rest = (batches, validation, store, encoder, library.name, fabric.device)
     task: Task
@@ -184,8 +183,7 @@ def _train_generator(config: GeneratorTraining, order: Order) -> dict[str, Any]:
     with Progress("tokenizing the training clips") as progress:
         bank = build_bank(tokenizer, batches, store, config.variants, fabric.device, progress)
     checked = build_bank(tokenizer, held_out, store, 1, fabric.device) if held_out else None
-    with torch.random.fork_rng():
-        torch.manual_seed(config.seed)
+    with seeded(config.seed, fabric.device):
         model = build(generator_config(config, tokenizer, encoder.width))
     task = GeneratorTask(
         model, tokenizer.quantizer, config, bank, checked, store, encoder, library.name, card.hash[:12], fabric.device
@@ -225,8 +223,7 @@ def _train_refit(config: RefitTraining, order: Order) -> dict[str, Any]:
     frozen, network = frozen.to(fabric.device), network.to(fabric.device)
     with Progress("drawing tokens of the training clips") as progress:
         bank = build_refit_bank(caller(network, frozen), frozen, batches, store, config, progress)
-    with torch.random.fork_rng():
-        torch.manual_seed(config.seed)
+    with seeded(config.seed, fabric.device):
         model = build(replace(card.config, seam=config.seam or card.config.seam))
     model.load_state_dict(frozen.state_dict(), strict=False)
     validation = whole_batches(held_out, normaliser, config.batch.size) if held_out else []
@@ -240,8 +237,7 @@ def _train_refiner(config: RefinerTraining, order: Order) -> dict[str, Any]:
     batches = training_batches(library, config, library.normaliser, fabric.device)
     held_out = library_samples(library, "val")
     validation = whole_batches(held_out, library.normaliser, config.batch.size) if held_out else []
-    with torch.random.fork_rng():
-        torch.manual_seed(config.seed)
+    with seeded(config.seed, fabric.device):
         network = build_refiner(config.model)
     task = RefinerTask(network, config, batches, validation, library.name, fabric.device)
     return order.fit(fabric, task, config, out)
@@ -257,8 +253,7 @@ def _train_evaluator(config: EvaluatorTraining, order: Order) -> dict[str, Any]:
     held_out = {split: library_samples(library, split) for split in ("val", "test")}
     own = (caption for samples in held_out.values() for sample in samples for caption in sample.captions)
     store = FeatureStore.cached(order.library, [*batches.captions(), *own, ""], encoder)
-    with torch.random.fork_rng():
-        torch.manual_seed(config.seed)
+    with seeded(config.seed, fabric.device):
         network = build_evaluator(replace(config.model, text_width=encoder.width))
     task = EvaluatorTask(network, config, batches, held_out, store, encoder, library.name, fabric.device)
     return order.fit(fabric, task, config, out)

@@ -6,6 +6,7 @@ import pytest
 from playground.analysis.store import build_bundle
 from playground.engine import Engine
 from playground.errors import PlaygroundError
+from playground.evaluation.published.items import results_of
 from playground.evaluation.run import Order, evaluate
 from tests.analysis.tiny import tiny_library
 from tests.evaluation.tiny import tiny_evaluator
@@ -55,3 +56,11 @@ def test_the_stored_analysis_holds_the_tokens_that_are_there(place):
         assert position < bundle.count(row, scale - 1)
     with pytest.raises(PlaygroundError, match="has no tokenizer"):
         build_bundle("mdm", library, engine=engine)
+
+
+@pytest.mark.parametrize("name", ["momaskpp", "mdm"])
+def test_the_decoder_is_timed_where_there_are_tokens(place, name):
+    engine, library = place
+    result = results_of("inference_time", [name], recompute=True, library=library, engine=engine, motions=2)[name]
+    parts = [(row["what"], row["seconds"]["n"]) for row in result.rows]
+    assert parts == [("text to motion", 2), ("tokens to motion", 2)][: 1 if name == "mdm" else 2]

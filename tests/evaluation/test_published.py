@@ -146,8 +146,8 @@ def test_only_what_changed_is_out_of_date(place: Place, found: dict[str, Result]
 def test_results_are_read_or_computed(place: Place, tmp_path: Path) -> None:
     assert results_of("strips", folder=tmp_path) == dict.fromkeys(LGTOK)
     given = {"engine": place[0], "library": place[1].path, "recompute": True}
-    made = results_of("inference_time", ["lgtok", SYSTEM], motions=1, **given)
-    assert made["lgtok"] is None and made[SYSTEM] is not None and made[SYSTEM].provenance["n"] == 1
+    made = results_of("inference_time", ["lgtok-mini", SYSTEM], motions=1, **given)
+    assert made["lgtok-mini"] is None and made[SYSTEM] is not None and made[SYSTEM].provenance["n"] == 1
 
 
 @pytest.mark.parametrize(("item", "changes", "words"), [
@@ -165,18 +165,30 @@ def test_bad_input_is_told(place: Place, item: str, changes: dict, words: str) -
 
 
 def test_the_flagship_is_measured_in_full() -> None:
-    full, less = settings_of("lgtok", Path("library")), settings_of(SYSTEM, Path("library"))
+    full, less = settings_of(SYSTEM, Path("library")), settings_of("lgtok-mini", Path("library"))
     assert (full.repeats, full.mm_texts, full.mm_samples) == (20, 96, 30) and less.repeats == 5
 
 
 def test_the_command(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.setattr(command, "default_engine", lambda: place[0])
-    call = ["strips", "--system", SYSTEM, "--system", "lgtok", "--out", str(tmp_path), "--work", str(tmp_path / "work")]
+    call = [
+        "strips",
+        "--system",
+        SYSTEM,
+        "--system",
+        "lgtok-mini",
+        "--out",
+        str(tmp_path),
+        "--work",
+        str(tmp_path / "work"),
+    ]
     assert command.main([*call, "--list"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         f"strips, {SYSTEM}: to be computed",
-        "strips, lgtok: not trained yet",
+        "strips, lgtok-mini: not trained yet",
     ]
+    assert command.main(["edits", "--system", "mdm", "--list"]) == 0
+    assert capsys.readouterr().out == "edits, mdm: only systems with tokens are measured\n"
     assert command.main(call) == 0
     assert read_result("strips", SYSTEM, tmp_path) is not None
     capsys.readouterr()

@@ -30,9 +30,9 @@ spread = join_spread()
 engine, evaluators = Engine(folder / "assets"), {"tmr": tiny_evaluator("tmr"), "clip": tiny_evaluator("clip")}
 order = Order(repeats=1, mm_texts=2, mm_samples=10, evaluators=evaluators, out=out)
 for repeats in (1, 2):  # the second call goes on where the first one ended
-    result = evaluate("lgtok-lite", folder / "library", "test", engine=engine, order=replace(order, repeats=repeats),
+    result = evaluate("lgtok", folder / "library", "test", engine=engine, order=replace(order, repeats=repeats),
                       spread=spread)
-sweep = guidance_sweep("lgtok-lite", folder / "library", scales=(0.0, 1.0), engine=engine, spread=spread,
+sweep = guidance_sweep("lgtok", folder / "library", scales=(0.0, 1.0), engine=engine, spread=spread,
                        order=Order(repeats=1, evaluators=evaluators))
 assert bool(result) == bool(sweep) == spread.first
 if spread.first:

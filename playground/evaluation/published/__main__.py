@@ -14,7 +14,16 @@ from playground.analysis.results import RESULTS, read_result, write_result
 from playground.engine import default_engine
 from playground.errors import PlaygroundError
 from playground.evaluation.published.base import Settings
-from playground.evaluation.published.items import ITEMS, OURS, can_measure, compute, item_of, settings_of, up_to_date
+from playground.evaluation.published.items import (
+    ITEMS,
+    OURS,
+    applies,
+    can_measure,
+    compute,
+    item_of,
+    settings_of,
+    up_to_date,
+)
 from playground.progress import Progress
 from playground.systems import row_of
 
@@ -41,7 +50,8 @@ def _one(name: str, system: str, options: argparse.Namespace) -> None:
     engine, item = default_engine(), ITEMS[name]
     settings = _settings(system, options)
     if not can_measure(item, system, engine):
-        _say(f"{name}, {system}: not trained yet")
+        why = "not trained yet" if applies(item, system) else "only systems with tokens are measured"
+        _say(f"{name}, {system}: {why}")
     elif not options.again and up_to_date(read_result(name, system, options.out), engine, settings):
         _say(f"{name}, {system}: up to date")
     elif options.list:

@@ -38,7 +38,7 @@ ITEMS: dict[str, Item] = {
         Item("strips", "motions of prompts (Figs 4, 9, 10)", motions.strips, tokenless=True),
         Item("levels", "levels kept against error, energy and coupling (MOGO, SnapMoGen)", levels.levels, False),
         Item("alignment", "A then B, B then A: order and attention (CASIM)", alignment.alignment, tokenless=True),
-        Item("inference_time", "seconds a motion (Table 9)", timing.inference_time),
+        Item("inference_time", "seconds a motion (Table 9)", timing.inference_time, tokenless=True),
     )
 }
 OURS = tuple(name for name, row in SYSTEMS.items() if row.command == "train")
@@ -59,10 +59,16 @@ def item_of(name: str) -> Item:
     return ITEMS[name]
 
 
+def applies(item: Item, system: str) -> bool:
+    """Whether a system is of a kind that has what an item measures: tokens, and a generator where it draws."""
+    row = row_of(system)
+    return bool((item.tokenless or row.tokenizer) and (row.generator or not item.draws))
+
+
 def can_measure(item: Item, system: str, engine: Engine) -> bool:
     """Whether the files that an item needs are there."""
     row = row_of(system)
-    if not (item.tokenless or row.tokenizer) or not (row.generator or not item.draws):
+    if not applies(item, system):
         return False
     parts = row.parts if item.draws else row.needed
     return all(checkpoint_path(engine.assets, system, part).is_file() for part in parts)
