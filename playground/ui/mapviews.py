@@ -42,7 +42,7 @@ SAVE = """(text) => {
 class Views:
     """The components of the panel."""
 
-    system: gr.CheckboxGroup
+    system: gr.Dropdown
     each: gr.Radio
     colour: gr.Dropdown
     map: gr.Radio
@@ -91,12 +91,12 @@ def panel_views(services: Services, systems: list[str], opening: View, near: str
 
 def _choices(
     services: Services, systems: list[str], opening: View
-) -> tuple[gr.CheckboxGroup, gr.Radio, gr.Dropdown, gr.Radio]:
+) -> tuple[gr.Dropdown, gr.Radio, gr.Dropdown, gr.Radio]:
     titles = {one.name: one.title for one in services.engine().systems()}
     several = len(systems) > 1
-    system = gr.CheckboxGroup(
-        [(titles[name], name) for name in systems], value=opening.controls.get("system", []),
-        label="Systems side by side", elem_id="embedding-system", visible=several,
+    system = gr.Dropdown(
+        [(titles[name], name) for name in systems], value=opening.controls.get("system", []), multiselect=True,
+        label="Systems side by side", elem_id="embedding-system", elem_classes=["mtp-several"], visible=several,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):
         each = gr.Radio(EACH, value="clip", label=control(NAME, "each").label, elem_id="embedding-each",

@@ -235,13 +235,13 @@ def room(services: Services) -> None:
     commits(NAME, {"code": current}, current.change)
 
 
-def _controls(services: Services, opening: View) -> tuple[gr.CheckboxGroup, gr.Radio, gr.Slider]:
+def _controls(services: Services, opening: View) -> tuple[gr.Dropdown, gr.Radio, gr.Slider]:
     """Systems (where there are several), order and k."""
     names = shown_systems(services)
     row = control(NAME, "k")
-    system = gr.CheckboxGroup(
-        [(row_of(name).title, name) for name in names], value=opening.controls.get("system", []),
-        label="Systems", elem_id="codebooks-system", visible=len(names) > 1,
+    system = gr.Dropdown(
+        [(row_of(name).title, name) for name in names], value=opening.controls.get("system", []), multiselect=True,
+        label="Systems", elem_id="codebooks-system", elem_classes=["mtp-several"], visible=len(names) > 1,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):
         order = gr.Radio(

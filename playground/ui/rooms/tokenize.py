@@ -254,7 +254,8 @@ def _controls(services: Services, opening: View) -> tuple[Any, ...]:
         )
     beside = gr.Dropdown(
         [(one.title, one.name) for one in shipped], value=[], multiselect=True, max_choices=MOST,
-        label=control(NAME, "beside").label, elem_id="tokenize-beside", visible=len(shipped) > 1,
+        label=control(NAME, "beside").label, elem_id="tokenize-beside", elem_classes=["mtp-several"],
+        visible=len(shipped) > 1,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-caption"]):
         caption = gr.Textbox(
