@@ -48,7 +48,7 @@ class Rebuilt:
     """n motions tokenized and decoded, their caption at both ends.
 
     errors_mm: [n] mean of a motion; ids, predictions: a scale int64 [n, s_n], -1 where a motion has fewer tokens;
-    likelihood: a scale [n], mean ln p of the true tokens. The last two are empty without a generator that has a
+    likelihood: a scale [n, s_n], ln p of the true tokens. The last two are empty without a generator that has a
     likelihood.
     """
 
@@ -173,7 +173,7 @@ class Passes:
         scales, heading = self.runtime.tokenizer.config.scales, self.runtime.heading
         motions, errors = self._nothing(len(items)), np.zeros(len(items))
         ids, predictions = np.zeros((2, len(items), sum(scales)))
-        likelihood = np.zeros((len(items), len(scales)))
+        likelihood = np.zeros((len(items), sum(scales)))
         for part in self._mine(items):
             batch = [items[place] for place in part]
             given = self._cut(batch, heading)
@@ -184,15 +184,15 @@ class Passes:
             real = self._real(batch)
             ids[part] = _padded(tokens.ids, real, scales)
             if self.predicts:
-                likelihood[part], best = self._predict(batch, tokens, real)
-                predictions[part] = _padded(best, real, scales)
+                chances, best = self._predict(batch, tokens)
+                likelihood[part], predictions[part] = (_padded(one, real, scales) for one in (chances, best))
             self.tally.add(len(part))
         cuts = np.cumsum(scales)[:-1]
         return Rebuilt(
             self._shared(motions),
             self.spread.total(errors),
             np.split(self.spread.total(ids).astype(np.int64), cuts, axis=1),
-            list(self.spread.total(likelihood).T) if self.predicts else [],
+            np.split(self.spread.total(likelihood), cuts, axis=1) if self.predicts else [],
             np.split(self.spread.total(predictions).astype(np.int64), cuts, axis=1) if self.predicts else [],
         )
 
@@ -241,21 +241,17 @@ class Passes:
 
         return level_masks(self.runtime.tokenizer, torch.tensor([i.rows for i in batch], device=self.runtime.device))
 
-    def _predict(
-        self, batch: Sequence[Item], tokens: Any, real: "tuple[Tensor, ...]"
-    ) -> "tuple[Floats, tuple[Tensor, ...]]":
-        """Mean ln p [B, N] of the true tokens a scale, and arg-max predictions [B, s_n] a scale, teacher-forced."""
+    def _predict(self, batch: Sequence[Item], tokens: Any) -> "tuple[tuple[Tensor, ...], tuple[Tensor, ...]]":
+        """ln p [B, s_n] of the true tokens and the arg-max predictions [B, s_n], a scale each, teacher-forced."""
         import torch
 
         generator: Any = self.runtime.generator
         text = self.runtime.texts([i.caption for i in batch], prompts=True)
         lengths = torch.tensor([i.rows for i in batch], device=self.runtime.device)
         logits = generator.logits(tokens, text, lengths)
-        true = []
-        for level, ids, mask in zip(logits, tokens.ids, real, strict=True):
-            chance = level.double().log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0]
-            true.append((chance * mask).sum(dim=1) / mask.sum(dim=1))
-        return torch.stack(true, dim=1).cpu().numpy(), tuple(level.argmax(dim=-1) for level in logits)
+        pairs = zip(logits, tokens.ids, strict=True)
+        true = (level.double().log_softmax(dim=-1).gather(-1, ids[..., None])[..., 0] for level, ids in pairs)
+        return tuple(true), tuple(level.argmax(dim=-1) for level in logits)
 
     # ---- arrays ---------------------------------------------------------------------------------------------------
 
@@ -289,10 +285,10 @@ class Passes:
         return Motions(embeddings, *(self.spread.total(array) for array in rest))
 
 
-def _padded(ids: "Sequence[Tensor]", real: "Sequence[Tensor]", scales: Sequence[int]) -> NDArray[np.int64]:
-    """Tokens [B, s_n] a scale -> [B, sum of scales], every scale filled up to full length with -1 for no token."""
+def _padded(values: "Sequence[Tensor]", real: "Sequence[Tensor]", scales: Sequence[int]) -> NDArray[Any]:
+    """[B, s_n] a scale, of tokens -> [B, sum of scales]; every scale filled up to full length, -1 for no token."""
     parts = [
         np.pad(level.masked_fill(~mask, -1).cpu().numpy(), ((0, 0), (0, scale - level.shape[1])), constant_values=-1)
-        for level, mask, scale in zip(ids, real, scales, strict=True)
+        for level, mask, scale in zip(values, real, scales, strict=True)
     ]
-    return np.concatenate(parts, axis=1).astype(np.int64)
+    return np.concatenate(parts, axis=1)

@@ -162,7 +162,8 @@ class Repeat:
             absent = ("model_perplexity_nll", "model_perplexity_argmax")
             return table | _absent(absent, f"the system {runtime.name} {why}")
         best = [level[level >= 0] for level in rebuilt.predictions]
-        table["model_perplexity_nll"] = _entry(metrics.model_perplexity_nll(rebuilt.likelihood), n)
+        true = [chances[level >= 0] for chances, level in zip(rebuilt.likelihood, rebuilt.ids, strict=True)]
+        table["model_perplexity_nll"] = _entry(metrics.model_perplexity_nll(true), n)
         table["model_perplexity_argmax"] = _entry(metrics.model_perplexity_argmax(best, codes), n)
         return table
 

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+import torch
 
 from playground.analysis.store import build_bundle
+from playground.data.library import Library
 from playground.engine import Engine
 from playground.errors import PlaygroundError
 from playground.evaluation.published.items import results_of
 from playground.evaluation.run import Order, evaluate
 from tests.analysis.tiny import tiny_library
+from tests.evaluation.test_repeats import items_of
 from tests.evaluation.tiny import tiny_evaluator
 from tests.tiny_systems import tiny_system
 
@@ -64,3 +67,19 @@ def test_the_decoder_is_timed_where_there_are_tokens(place, name):
     result = results_of("inference_time", [name], recompute=True, library=library, engine=engine, motions=2)[name]
     parts = [(row["what"], row["seconds"]["n"]) for row in result.rows]
     assert parts == [("text to motion", 2), ("tokens to motion", 2)][: 1 if name == "mdm" else 2]
+
+
+def test_every_token_weighs_the_same_in_the_perplexity(place):
+    engine, path = place
+    library, runtime = Library.open(path), engine.runtime("t2mgpt-casim")
+    result = evaluate("t2mgpt-casim", path, engine=engine, order=Order(repeats=1, mm_texts=1, evaluators={}))
+    losses = []
+    for item in items_of(library, 0):
+        rows = library.features(item.index, runtime.heading)[item.start : item.start + item.rows]
+        lengths = torch.tensor([item.rows])
+        tokens = runtime.tokenizer.encode(torch.from_numpy(runtime.normaliser.apply(rows))[None], lengths, None).tokens
+        (logits,) = runtime.generator.logits(tokens, runtime.texts([item.caption], prompts=True), lengths)
+        losses.append(torch.nn.functional.cross_entropy(logits[0], tokens.ids[0][0], reduction="none").tolist())
+    assert len({len(one) for one in losses}) > 1  # motions of several lengths
+    expected = np.exp(np.mean(np.concatenate(losses)))
+    assert result["metrics"]["model_perplexity_nll"]["mean"] == pytest.approx(expected, rel=1e-4)
