@@ -158,15 +158,25 @@ def files_of(system: str, assets: Path = ASSETS) -> dict[str, str]:
     first = row_of(system).parts[0]
     paths = {"checkpoint": checkpoint_path(assets, system, first)}
     paths["generator"] = checkpoint_path(assets, system, "generator")
-    return {
-        key: hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else "" for key, path in paths.items()
-    }
+    return {key: _digest(path) for key, path in paths.items()}
 
 
-def is_stale(result: Result, assets: Path = ASSETS) -> bool:
-    """Whether a result was measured on other files of its system than those that are there now."""
-    now = files_of(result.system, assets)
-    return any(result.provenance.get(key, value) != value for key, value in now.items())
+def is_stale(result: Result, assets: Path = ASSETS, judges: Mapping[str, str] | None = None) -> bool:
+    """Whether a system has other files, other evaluators or another usual sampling now than when it was measured.
+
+    judges: digests of the evaluators by name, those of the shipped ones by default.
+    """
+    told: dict[str, Any] = result.provenance
+    drawn, judged = told.get("sampling") or {}, told.get("evaluators") or {}
+    if judges is None:
+        judges = {name: _digest(checkpoint_path(ASSETS, "evaluators", name)) for name in judged}
+    usual = vars(row_of(result.system).sampling)
+    pairs = ((told, files_of(result.system, assets)), (drawn, usual), (judged, judges))
+    return any(then.get(key, value) != value for then, now in pairs for key, value in now.items())
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else ""
 
 
 def why_absent(system: str, draws: bool = True, assets: Path = ASSETS) -> str:

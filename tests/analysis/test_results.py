@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from playground.analysis.results import (
 )
 from playground.errors import PlaygroundError
 from playground.motion.skeleton import HUMAN22
+from playground.systems import row_of
 
 SYSTEM = "lgtok"
 RESULT = Result(
@@ -94,6 +96,18 @@ def test_absence_and_age_follow_the_files(tmp_path: Path) -> None:
     assert not is_stale(fresh, tmp_path)
     (folder / "generator.safetensors").write_bytes(b"three")
     assert is_stale(fresh, tmp_path)
+
+
+def test_age_follows_the_evaluators_and_the_usual_sampling(tmp_path: Path) -> None:
+    usual = asdict(row_of(SYSTEM).sampling)
+    made = {"system": SYSTEM, "sampling": usual, "evaluators": {"tmr": "0" * 12}} | files_of(SYSTEM, tmp_path)
+    assert not is_stale(Result("evaluation", "", made, []), tmp_path, {"tmr": "0" * 12, "clip": "1" * 12})
+    assert is_stale(Result("evaluation", "", made, []), tmp_path, {"tmr": "2" * 12})
+    assert is_stale(Result("evaluation", "", made, []), tmp_path)  # the shipped one is another
+    some = {key: value for key, value in usual.items() if key != "guidance"}
+    for sampling, stale in ((some, False), (usual | {"guidance": 9.0}, True)):
+        result = Result("evaluation", "", made | {"sampling": sampling, "evaluators": {}}, [])
+        assert is_stale(result, tmp_path) is stale
 
 
 numbers = st.floats(-1e6, 1e6)

@@ -166,7 +166,8 @@ def test_bad_input_is_told(place: Place, item: str, changes: dict, words: str) -
 
 def test_the_flagship_is_measured_in_full() -> None:
     full, less = settings_of(SYSTEM, Path("library")), settings_of("lgtok-mini", Path("library"))
-    assert (full.repeats, full.mm_texts, full.mm_samples) == (20, 96, 30) and less.repeats == 5
+    assert (full.repeats, full.mm_texts, full.mm_samples, full.motions) == (20, 24, 10, 100)
+    assert (less.repeats, less.mm_texts, less.mm_samples) == (5, 12, 10)
 
 
 def test_the_command(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:

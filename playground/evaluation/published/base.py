@@ -33,7 +33,7 @@ class Settings:
     split: str = "test"
     seed: int = 0
     repeats: int = 5
-    mm_texts: int = 24
+    mm_texts: int = 12
     mm_samples: int = 10
     motions: int = 24
     work: Path | None = None
