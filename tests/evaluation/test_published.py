@@ -56,11 +56,11 @@ def test_every_result_says_how_it_was_made(found: dict[str, Result], settings: b
         assert result.made_by.startswith(f"python -m playground.evaluation.published {name} --system {SYSTEM}")
         assert str(settings.library) not in result.made_by
         json.dumps(result.as_dict(), allow_nan=False)
-    assert "--repeats 1 --mm-texts 24 --mm-samples 0" in found["evaluation"].made_by
+    assert "--repeats 1 --mm-texts 12 --mm-samples 0" in found["evaluation"].made_by
 
 
 def test_an_evaluation_is_the_evaluation(place: Place, found: dict[str, Result]) -> None:
-    order = Order(1, 24, 0, evaluators=EVALUATORS)
+    order = Order(1, 12, 0, evaluators=EVALUATORS)
     whole = evaluate(SYSTEM, place[1].path, engine=place[0], order=order)
     rows = {row["of"]: row for row in found["evaluation"].rows}
     for of, table in (("generated", "metrics"), ("real", "real"), ("reconstruction", "reconstruction")):
