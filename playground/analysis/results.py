@@ -104,7 +104,7 @@ class Result:
             parts.append(f"{clips}{facts.get('split', '')} clips of {facts['data']}")
         repeats = facts.get("repeats")
         parts += [f"{repeats} repeat{'s' if repeats != 1 else ''}"] if repeats else []
-        if facts.get("mm_samples"):
+        if facts.get("mm_samples") and self.estimate("multimodality", of="generated").mean is not None:
             parts.append(f"MultiModality of {facts['mm_texts']} texts by {facts['mm_samples']} motions")
         parts += [f"seed {facts['seed']}"] if "seed" in facts else []
         return ", ".join(parts)

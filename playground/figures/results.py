@@ -3,12 +3,12 @@
 import sys
 
 from playground.analysis.results import Estimate, Result, read_result
-from playground.figures.tables import DASH, Table, number, significant
+from playground.figures.tables import DASH, Table, guidance_of, number, significant
 from playground.systems import SYSTEMS
 
 GENERATED, CLIPS = "generated", "every clip once"
 HEADS = (
-    "system", "tokens", "numbers, M", "checkpoints", "MPJPE, mm", "FID", "Top 3 of 32", "prompts obeyed",
+    "system", "tokens", "numbers, M", "checkpoints", "MPJPE, mm", "g", "FID", "Top 3 of 32", "prompts obeyed",
     "feet slide, mm/s",
 )  # fmt: skip
 
@@ -27,7 +27,7 @@ def results_table(results: dict[str, Result]) -> Table:
         marks = [f"`{mark}`" for mark in (facts.get("checkpoint"), facts.get("generator")) if mark]
         rows.append((
             f"`{name}`", str(facts.get("tokens") or DASH), significant(facts["parameters"] / 1e6),
-            ", ".join(dict.fromkeys(marks)), number(result.estimate("mpjpe_mm", of=CLIPS)),
+            ", ".join(dict.fromkeys(marks)), number(result.estimate("mpjpe_mm", of=CLIPS)), guidance_of(result),
             *_drawn(result, GENERATED),
         ))  # fmt: skip
     return Table(HEADS, tuple(rows), "All systems", measured(results))
@@ -46,7 +46,7 @@ def measured(results: dict[str, Result]) -> str:
 
 
 def _real(result: Result) -> tuple[str, ...]:
-    return ("recorded motion", *[DASH] * 4, *_drawn(result, "real"))
+    return ("recorded motion", *[DASH] * 5, *_drawn(result, "real"))
 
 
 def _drawn(result: Result, of: str) -> tuple[str, ...]:

@@ -119,19 +119,38 @@ class Column:
 
 
 def systems_table(
-    results: Results, columns: Sequence[Column], title: str, caption: str = "", *, draws: bool = True, note: str = ""
+    results: Results,
+    columns: Sequence[Column],
+    title: str,
+    caption: str = "",
+    *,
+    draws: bool = True,
+    guided: bool = False,
+    note: str = "",
 ) -> Table:
-    """One row a system: its tokens and the columns; where there is no result, why. note: added to the caption."""
+    """One row a system: its tokens and the columns; where there is no result, why. note: added to the caption.
+
+    guided: with a column of the g that motions were drawn with.
+    """
     rows = []
     for system, result in results.items():
-        head = (SYSTEMS[system].title, str(result.provenance.get("tokens", DASH)) if result else DASH)
+        head = [SYSTEMS[system].title, str(result.provenance.get("tokens") or DASH) if result else DASH]
+        head += [guidance_of(result)] if guided else []
         if result is None:
             rows.append((*head, why_absent(system, draws), *[DASH] * (len(columns) - 1)))
             continue
         values = [result.estimate(column.key, **dict(column.of)) for column in columns]
         rows.append((*head, *(number(v, c.scale) for v, c in zip(values, columns, strict=True))))
     lines = "\n".join(line for line in (caption, measured_on(results), *_whys(results, columns), note) if line)
-    return Table(("system", "tokens", *(column.head for column in columns)), tuple(rows), title, lines)
+    heads = ("system", "tokens", *(("g",) if guided else ()), *(column.head for column in columns))
+    return Table(heads, tuple(rows), title, lines)
+
+
+def guidance_of(result: Result | None) -> str:
+    """The decoder's g that generated motions of a result were read with; a dash for systems that know none."""
+    if result is None or SYSTEMS[result.system].family != "lgtok" or SYSTEMS[result.system].generator is None:
+        return DASH
+    return f"{result.provenance['sampling']['guidance']:g}"
 
 
 def _whys(results: Results, columns: Sequence[Column]) -> list[str]:
@@ -147,12 +166,9 @@ def _whys(results: Results, columns: Sequence[Column]) -> list[str]:
 
 
 def measured_on(results: Results) -> str:
-    """What every number was measured on, a line a system; systems whose files have changed since are marked."""
-    lines = [
-        f"{result.line}{'; the checkpoint shipped now is another: make figures' if is_stale(result) else ''}"
-        for result in results.values()
-        if result is not None
-    ]
+    """What every number was measured on, a line a system; what would be measured otherwise now is marked."""
+    aged = "; its checkpoint, the evaluator or the sampling is another now: make figures"
+    lines = [f"{result.line}{aged if is_stale(result) else ''}" for result in results.values() if result is not None]
     return "\n".join(lines)
 
 

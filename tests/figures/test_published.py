@@ -5,7 +5,7 @@ import pytest
 
 from playground.analysis.motions import packed
 from playground.analysis.results import Result
-from playground.figures import ablations, editing, language, quality, timing
+from playground.figures import ablations, editing, language, quality, tables, timing
 from playground.figures.tables import Table
 from playground.figures.theme import on_dark
 from playground.systems import BASE_SYSTEM
@@ -16,7 +16,7 @@ BASE, FLAGSHIP, BARE = BASE_SYSTEM, "lgtok", "lgtok-notext"
 
 def facts(system: str, **more: object) -> dict:
     return {"system": system, "checkpoint": "0" * 12, "generator": "0" * 12, "data": "tiny", "split": "test", "n": 5,
-            "seed": 0, "tokens": 160} | more  # fmt: skip
+            "seed": 0, "tokens": 160, "sampling": {"guidance": 1.5}} | more  # fmt: skip
 
 
 def entry(mean: float, ci95: float = 0.01) -> dict:
@@ -58,6 +58,8 @@ EVALUATIONS = {BASE: evaluation(BASE, 1.0), BARE: evaluation(BARE, 2.0), "lgtok-
 def test_table_1_takes_both_fids() -> None:
     row = cells(quality.table1(EVALUATIONS), "LG-Tok lite")
     assert (row["rFID"], row["gFID"], row["MPJPE, mm"]) == ("201 ± 0", "1.00 ± 0.01", "209 ± 0")
+    assert (row["g"], cells(quality.table1({BASE: None}), "LG-Tok lite")["g"]) == ("1.5", "–")
+    assert tables.guidance_of(evaluation("momask", 1.0)) == tables.guidance_of(evaluation("lgtok-rvq", 1.0)) == "–"
     assert cells(quality.table1({BASE: None}), "LG-Tok lite")["rFID"] in (
         "not trained yet",
         "trained, not measured yet",
@@ -140,8 +142,19 @@ def test_table_5_and_its_claims() -> None:
         "0.800 ± 0.010",
     )
     said = [row[3] for row in language.table5_claims(results).rows]
-    assert said[0].startswith("seen") and said[2].startswith("seen") and said[3].startswith("not seen")
-    assert said[1].startswith("cannot be said")
+    assert said[0].startswith("seen") and said[3].startswith("seen") and said[4].startswith("not seen")
+    assert said[1].startswith("cannot be said") and said[2].startswith("seen")  # nodrop is best at g = 0
+
+
+def test_a_decoder_without_text_is_not_compared_with_itself() -> None:
+    flat = sweep(BARE, 0.0)
+    for row in flat.rows:
+        row |= {"fid": entry(2.0), language.TOP: entry(0.9)}
+    row = cells(language.sweep_table({BARE: flat}), "LG-Tok without text")
+    assert row["best g by FID"].startswith("any") and row["FID"] == "2.00 ± 0.01" and row["g by default"] == "–"
+    rows = [{"drawn": drawn, "read": read, "fid": entry(2.0)} for drawn in ("free", "prompted")
+            for read in ("no text", "text, g = 0", "text, g = 1", "text, g = 2")]  # fmt: skip
+    assert language.table8_claims({BARE: Result("free_form", "", facts(BARE), rows)}).rows == ()
 
 
 def test_table_8_has_a_row_for_every_reading() -> None:

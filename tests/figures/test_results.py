@@ -27,9 +27,9 @@ def result(**more: object) -> Result:
 def test_a_row_says_what_was_measured_and_a_dash_where_nothing_was() -> None:
     table = results_table({"momask": result()})
     assert table.columns == HEADS and len(table.rows) == 2
-    expected = ("`momask`", "294", "4.30", "`abc`, `def`", "31.3", "0.500 ± 0.250", "–", "50 %", "301")
+    expected = ("`momask`", "294", "4.30", "`abc`, `def`", "31.3", "–", "0.500 ± 0.250", "–", "50 %", "301")
     assert table.rows[1] == expected
-    assert table.rows[0][0] == "recorded motion" and table.rows[0][5:] == ("0.500 ± 0.250", "–", "–", "99.0")
+    assert table.rows[0][0] == "recorded motion" and table.rows[0][6:] == ("0.500 ± 0.250", "–", "–", "99.0")
     assert table.caption == "some, val split, 7 clips, 2 repeats (mean and 95 % interval), seed 3, evaluator tmr e"
 
 
@@ -37,6 +37,11 @@ def test_what_differs_in_how_it_was_measured_is_said_by_name() -> None:
     said = results_table({"momask": result(), "mogo": result(), "mosa": result(repeats=5)}).caption.split("; ")
     assert [one.split(":")[0] for one in said] == ["momask, mogo", "mosa"]
     assert "2 repeats" in said[0] and "5 repeats" in said[1]
+
+
+def test_the_guidance_that_was_drawn_with_is_shown() -> None:
+    row = results_table({"lgtok-mid": result(system="lgtok-mid", sampling={"guidance": 2.5})}).rows[1]
+    assert row[HEADS.index("g")] == "2.5"
 
 
 def test_a_system_without_tokens_has_dashes() -> None:

@@ -99,7 +99,8 @@ def up_to_date(found: Result | None, engine: Engine, settings: Settings) -> bool
     """Whether a stored result is of the files and the usual sampling that are there now, and of these settings."""
     if found is None:
         return False
-    judges = settings.evaluators and {name: one.hash[:12] for name, one in settings.evaluators.items()}
+    given = settings.evaluators
+    judges = None if given is None else {name: one.hash[:12] for name, one in given.items()}
     told = found.provenance
     same = all(told[key] == getattr(settings, key) for key in _ASKED if key in told)
     return same and not is_stale(found, engine.assets, judges)
