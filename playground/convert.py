@@ -40,6 +40,7 @@ WANTED = {  # options that the released models share, spelt as in the authors' o
     "phi_k": "3",
     "phi_depth": "2",
     "text_model": "Llama-3.2-1B",
+    "text_max_len": "77",
 }
 DATA = {"t2m": "HumanML3D", "motionx": "Motion-X", "cmp": "CMP"}  # dataset_name -> the name on the card
 STATISTICS = ("Mean.npy", "Std.npy")
@@ -115,7 +116,10 @@ def _notes(normaliser: Normaliser | None, data: str) -> list[str]:
             " --statistics and the folder of the data set"
         )
     if data == "Motion-X":
-        notes.append("Motion-X has 30 frames a second; the playground shows motions at 20, so these will look slow")
+        notes.append(
+            "Motion-X has 30 frames a second, the playground works at 20: motions that it makes look slow, and those"
+            " that it tokenizes move faster than what it was trained on"
+        )
     return notes
 
 

@@ -237,7 +237,12 @@ def load_runtime(assets: Path, row: SystemRow) -> Runtime:
     first = row.parts[0]
     card, normaliser = cards[first], cards[first].normaliser
     if normaliser is None:
-        raise PlaygroundError(f"{paths[first]} carries no normaliser; it is not a finished {first} checkpoint")
+        made = (
+            "convert it again with --statistics"
+            if row.command == "convert"
+            else f"it is no finished {first} checkpoint"
+        )
+        raise PlaygroundError(f"{paths[first]} carries no mean and std of its data; {made}")
     encoder = prompt_encoder = load_encoder(row.text)
     if tokenizer is not None:
         check_same(card.encoder, encoder)

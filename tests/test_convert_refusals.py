@@ -43,6 +43,11 @@ STRANGE = {
     ),
     "a generator of other codes": (_swap("heads.1.weight", torch.ones(11, 16), True), "another tokenizer"),
     "a generator with other positions": (_swap("freqs_cis", torch.ones(10, 4, dtype=torch.complex64), True), "rotary"),
+    "a generator with real positions": (_swap("freqs_cis", torch.ones(10, 4), True), "rotary"),
+    "attention that is a number": (
+        _swap("decoder.transformer.middle_block.multihead_attn.in_proj_bias", torch.tensor(1.0)),
+        "in_proj_bias",
+    ),
     "a generator without a norm": (_swap("blocks.1.ln2.scale", None, True), "ln2"),
     "a mask vector of another width": (_swap("mask_token", torch.ones(1, 1, 17)), "shape"),
     "a width beyond all": (_swap("latent_tokens", torch.ones(6, 1_000_000)), "no LG-Tok of that size"),
@@ -114,8 +119,7 @@ def test_a_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.Monke
         (options_text(scales="9" * 4000), "scales"),
         (options_text(rope_base="1000.0"), "rotary"),
         (options_text(rope_base="much"), "whole number"),
-        (options_text(text_max_len="0"), "whole number"),
-        (options_text(text_max_len="9999999"), "rotary"),
+        (options_text(text_max_len="0"), "text_max_len: 0; 77"),
         (options_text(norm="GroupNorm"), "norms"),
     ],
 )

@@ -89,5 +89,6 @@ def _check_rope(state: ForeignState, config: GeneratorConfig) -> None:
     found = state.arrays["freqs_cis"]
     places = [torch.linspace(0.0, config.rope_span, s) if s > 1 else torch.zeros(1) for s in config.scales]
     cos, sin = rope_angles(torch.cat(places), config.width // config.heads, config.rope_base)
-    if found.shape != cos.shape or not torch.allclose(found, torch.complex(cos, sin), atol=ROPE_TOLERANCE):
+    same = found.is_complex() and found.shape == cos.shape
+    if not same or not torch.allclose(found.to(torch.complex64), torch.complex(cos, sin), atol=ROPE_TOLERANCE):
         raise PlaygroundError(f"{state.path} has rotary positions of another kind than the released models")

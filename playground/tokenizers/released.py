@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from playground.errors import PlaygroundError
+from playground.motion.representation import COLUMNS
 from playground.nn.foreign import ForeignState
 from playground.nn.rope import rope_angles
 from playground.tokenizers.transformer import TokenizerConfig
@@ -63,6 +64,10 @@ def _config(state: ForeignState, settings: Mapping[str, str]) -> TokenizerConfig
     frames = state.shape("decoder.de_position_embedding.pos_embed", 2)[0]
     _, columns, _ = state.shape("encoder.to_patch_embedding.weight", 3)
     head_width = state.shape(f"{FIRST_BLOCK}.rotary_embedding.x_cos", 4)[3]
+    if columns != COLUMNS:
+        raise PlaygroundError(
+            f"{state.path} reads motions of {columns} columns; models of {COLUMNS} columns are needed"
+        )
     norm = NORMS.get(settings.get("norm", "RMS"))
     depth = 1 + 2 * state.count("encoder.transformer.input_blocks")
     scales = _scales(settings)
@@ -166,7 +171,8 @@ def _block(state: ForeignState, ours: str, theirs: str, crossed: bool) -> Weight
         out |= _norm(state, f"{ours}.norms.{index}", f"{theirs}.norm{number}")
     for index, name in enumerate(("multihead_attn", "multihead_attn2") if crossed else ()):
         memory = f"{ours}.cross_attentions.{index}"
-        for kind in ("weight", "bias"):
+        for kind, axes in (("weight", 2), ("bias", 1)):
+            state.shape(f"{theirs}.{name}.in_proj_{kind}", axes)
             query, key_value = _thirds(state.take(f"{theirs}.{name}.in_proj_{kind}"))
             out[f"{memory}.query.{kind}"], out[f"{memory}.key_value.{kind}"] = query, key_value
         out |= _pair(state, f"{memory}.out", f"{theirs}.{name}.out_proj")

@@ -17,7 +17,7 @@ from tqdm import tqdm
 from playground.errors import PlaygroundError
 from playground.launch import Launch, launch_fabric
 from playground.training.configs import Schedule, rate_at
-from playground.training.state import load_state, save_state
+from playground.training.state import load_state, random_state, save_state
 
 LOG_EVERY = 20  # steps
 
@@ -103,7 +103,7 @@ def _fit(run: Fit) -> dict[str, Any]:
     )
     facts: dict[str, Any] = {"step": 0, "seconds": 0.0, "validation": []}
     if state_path.exists():
-        facts = load_state(state_path, task.model, optimizer)
+        facts = load_state(state_path, task.model, optimizer, run.fabric.global_rank, run.fabric.device)
         if facts["step"] >= schedule.steps and (run.out / "checkpoint.safetensors").is_file():
             return facts  # nothing to do; written again, the file would have another hash
     facts |= {"steps": schedule.steps, "device": device_name(run.fabric.device)} | run.about
@@ -148,11 +148,19 @@ def _steps(run: Fit, model: Any, optimizer: Any, facts: dict[str, Any]) -> None:
         if main and (last or (step + 1) % schedule.validate_every == 0):
             _validate(run, facts, bar)
             model.train()
-        if main and (last or due or (step + 1) % schedule.save_every == 0):
-            save_state(run.out / "state.safetensors", run.task.model, optimizer.optimizer, facts)
+        if last or due or (step + 1) % schedule.save_every == 0:
+            random = _of_all(fabric)
+            if main:
+                save_state(run.out / "state.safetensors", run.task.model, optimizer.optimizer, facts, random)
         if due:
             break
     bar.close()
+
+
+def _of_all(fabric: Fabric) -> dict[str, Tensor]:
+    """The random states of all processes, a row each."""
+    own = random_state(fabric.device).items()
+    return {place: torch.atleast_2d(fabric.all_gather(state).cpu()) for place, state in own}  # type: ignore[union-attr]
 
 
 def _validate(run: Fit, facts: dict[str, Any], bar: Any) -> None:

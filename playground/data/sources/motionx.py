@@ -75,7 +75,7 @@ def _clips(motions: Path, texts: Path, ids: list[tuple[str, str]], left_out: Cou
         if not motion.is_file() or not text.is_file():
             left_out["ids without a motion or a text file"] += 1
             continue
-        spans = read_texts(text)
+        spans = read_texts(text, left_out)
         if not spans:
             left_out["ids without a caption"] += 1
         rows = read_numbers(motion)
@@ -125,9 +125,9 @@ def source_of(rows: Rows) -> Source:
     return source_of_positions(joints, HUMAN22.joints, PARENTS, OFFSETS, FPS, "Motion-X motion")
 
 
-def read_texts(path: Path) -> dict[Span, tuple[str, ...]]:
-    """The captions of one text by span: HumanML3D's lines, or plain ones for the whole clip."""
+def read_texts(path: Path, left_out: Counter[str]) -> dict[Span, tuple[str, ...]]:
+    """The captions of one text by span: HumanML3D's lines, or plain ones for the whole clip; see read_captions."""
     lines = [line.strip() for line in read_text(path).splitlines() if line.strip()]
-    if lines and all(line.count("#") >= 3 for line in lines):
-        return read_captions(path)
+    if any(line.count("#") >= 3 for line in lines):
+        return read_captions(path, left_out)
     return {(0.0, 0.0): tuple(lines)} if lines else {}
