@@ -209,3 +209,16 @@ def verdict(better: Estimate, worse: Estimate, *, lower: bool = True) -> str:
         return f"not seen: it is the other way round, {apart}"
     leaning = "as the paper has it" if (first.mean or 0.0) < (second.mean or 0.0) else "the other way round"
     return f"undecided: the intervals overlap; the means stand {leaning}"
+
+
+def verdict_of_pairs(gain: Estimate) -> str:
+    """The same of a difference that was measured pair by pair; gain: by how much the first is better, above 0 if it is.
+
+    PlaygroundError without a mean.
+    """
+    if gain.mean is None:
+        raise PlaygroundError("there is no difference to judge")
+    said = f"clip by clip it gains {gain.mean:.2f} ± {gain.ci95 or 0:.2f}"
+    if gain.low > 0:
+        return f"seen: {said}"
+    return f"not seen: it is the other way round, {said}" if gain.high < 0 else f"undecided: {said}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from playground.analysis.paired import weighted
 from playground.analysis.passes import first_caption, rows_of
 from playground.data.library import Library
 from playground.evaluation.items import ITEMS, Item, draw_items, measurable, stream
@@ -33,11 +34,13 @@ def measure_tokenizer(
     repeats: int = 5,
     seed: int = 0,
 ) -> dict[str, Any]:
-    """Reconstruction of a split by the tokenizer in a file: what `reconstruct` gives, and three things more.
+    """Reconstruction of a split by the tokenizer in a file: what `reconstruct` gives, and some things more.
 
-    mpjpe_mm_ci95: 1.96 standard errors of the mean over clips. mpjpe_mm_long: over clips of more than LONG rows, with
-    their number n_long. fid: {"mean", "ci95", "n", "repeats", "evaluator"} of rebuilt against recorded motions, windows
-    and captions drawn anew for every repeat; "why" in the place of a mean that does not exist.
+    mpjpe_mm_ci95: 1.96 standard errors over clips of that mean over frames. by_clip: {"mm", "frames"}, the error and
+    the length of every clip in the order of the split, as words, so that two tokenizers can be compared clip by clip.
+    mpjpe_mm_long: over clips of more than LONG rows, with their number n_long. fid: {"mean", "ci95", "n", "repeats",
+    "evaluator"} of rebuilt against recorded motions, windows and captions drawn anew for every repeat; "why" in the
+    place of a mean that does not exist.
     PlaygroundError if the file is no tokenizer or the split holds no clip to measure.
     """
     runtime = open_tokenizer(path, name)
@@ -48,7 +51,11 @@ def measure_tokenizer(
     errors, rows = passes.rebuilt(whole).errors_mm, np.array([item.rows for item in whole])
     long = rows > LONG
     return found | {
-        "mpjpe_mm_ci95": float(1.96 * errors.std() / np.sqrt(len(errors))),
+        "mpjpe_mm_ci95": weighted(errors, rows)[1],
+        "by_clip": {
+            "mm": " ".join(f"{error:.2f}" for error in errors),
+            "frames": " ".join(str(count) for count in rows),
+        },
         "mpjpe_mm_long": float(np.average(errors[long], weights=rows[long])) if long.any() else None,
         "n_long": int(long.sum()),
         "fid": reconstruction_fid(runtime, library, clips, evaluator, repeats, seed),

@@ -10,7 +10,7 @@ from html import escape
 from typing import Any
 
 from playground.analysis.cited import cited
-from playground.analysis.results import Estimate, Result, is_stale, verdict, why_absent
+from playground.analysis.results import Estimate, Result, is_stale, verdict, verdict_of_pairs, why_absent
 from playground.errors import PlaygroundError
 from playground.systems import SYSTEMS
 
@@ -94,14 +94,18 @@ class Claim:
     better: Estimate
     worse: Estimate
     lower: bool = True  # is a lower number better?
+    gain: Estimate | None = None  # by how much the first is better, where both were measured on the same clips
 
 
 def claims_table(claims: Sequence[Claim], title: str = "Is it seen here?", caption: str = "") -> Table:
     """Every claim with both numbers and what they say about it."""
-    rows = tuple(
-        (claim.text, number(claim.better), number(claim.worse), verdict(claim.better, claim.worse, lower=claim.lower))
-        for claim in claims
-    )
+
+    def said(claim: Claim) -> str:
+        if claim.gain is not None and claim.gain.mean is not None:
+            return verdict_of_pairs(claim.gain)
+        return verdict(claim.better, claim.worse, lower=claim.lower)
+
+    rows = tuple((claim.text, number(claim.better), number(claim.worse), said(claim)) for claim in claims)
     return Table(("what the paper says", "the better one, ours", "the other, ours", "seen here?"), rows, title, caption)
 
 

@@ -201,6 +201,11 @@ def test_ablation_claims_lines_and_plot() -> None:
     said = {row[0]: row[3] for row in ablations.ablation_claims(ABLATIONS).rows}
     assert said["RMSNorm is better than LayerNorm (MPJPE)"].startswith("seen")
     assert said["RMSNorm is better than LayerNorm (rFID)"].startswith("not seen: both are equal")
+    paired = Result("ablations", "", ABLATIONS.provenance, [dict(row) for row in ABLATIONS.rows])
+    for row, mm in zip(paired.rows, ("50 60 70", "51 62 71", *["50 60 70"] * 4), strict=True):
+        row |= {"by_clip": {"mm": mm, "frames": "20 20 40"}} if row["status"] == "trained" else {}
+    said_of_pairs = {row[0]: row[3] for row in ablations.ablation_claims(paired).rows}
+    assert said_of_pairs["RMSNorm is better than LayerNorm (MPJPE)"].startswith("seen: clip by clip it gains 1.25 ±")
     assert "text-none is not trained yet" in said["text in both is better than no text (rFID)"]
     assert ablations.ablations_line(ABLATIONS).startswith("5 of 6 rows are trained, size cpu, 3,000 steps")
     assert "make ablations" in ablations.ablations_line(None)
