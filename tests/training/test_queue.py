@@ -254,3 +254,7 @@ def test_measured_errors_are_those_of_evaluate(library, tmp_path):
     assert {key: found[key] for key in plain} == plain
     assert found["mpjpe_mm_long"] == pytest.approx(plain["by_source"]["B"]["mpjpe_mm"], rel=1e-4)  # the longer clip
     assert found["n_long"] == 1
+    errors, frames = ([float(word) for word in found["by_clip"][key].split()] for key in ("mm", "frames"))
+    assert sum(e * f for e, f in zip(errors, frames, strict=True)) / sum(frames) == pytest.approx(
+        plain["mpjpe_mm"], rel=1e-3
+    )
