@@ -7,9 +7,11 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from playground.analysis.results import Estimate
 from playground.analysis.usage import CodeUsage
 from playground.errors import PlaygroundError
 from playground.figures.colors import system_color
+from playground.figures.tables import Claim, Table, claims_table
 from playground.figures.theme import HEIGHT, finish, listed, percent, readable, reference_line, scale_colors
 
 _UNIT = "times even use"
@@ -123,6 +125,33 @@ def usage_summary(
     for column in (1, 2):
         figure.update_yaxes(range=[0, 104], nticks=6, row=1, col=column)
     return finish(figure, title=title, caption=caption, height=height, heads=1, tick_lines=2)
+
+
+def usage_claims(usages: Mapping[str, CodeUsage], titles: Mapping[str, str]) -> Table:
+    """Fig. 7 in numbers: does the first system use its codes more evenly than each of the others?
+
+    Evenness is the perplexity of the codes as a share of the codebook, mean over scales: of all, of the coarse half and
+    of the fine half.
+    """
+    first, *others = usages
+    half = len(usages[first].codes_) // 2
+    parts = (("all scales", slice(None)), ("the coarse half", slice(half)), ("the fine half", slice(half, None)))
+
+    def evenness(name: str, scales: slice) -> Estimate:
+        shares = (usages[name].perplexity_ / np.asarray(usages[name].codes_))[scales]
+        counted = shares.size and np.isfinite(shares).all()
+        return Estimate(float(shares.mean())) if counted else Estimate(None, why="no token was counted")
+
+    claims = [
+        Claim(
+            f"{titles[first]} uses its codes more evenly than {titles[other]}, {words}",
+            evenness(first, scales), evenness(other, scales), lower=False,
+        )
+        for other in others
+        for words, scales in parts
+    ]  # fmt: skip
+    note = "Perplexity of the codes as a share of the codebook, mean over scales; 1 is even use. One training each."
+    return claims_table(claims, caption=note)
 
 
 def _end_label(figure: go.Figure, x: int, y: float, text: str, column: int) -> None:

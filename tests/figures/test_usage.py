@@ -7,7 +7,7 @@ import pytest
 
 from playground.analysis.usage import CodeUsage
 from playground.errors import PlaygroundError
-from playground.figures.usage import usage_histogram, usage_panels, usage_summary
+from playground.figures.usage import usage_claims, usage_histogram, usage_panels, usage_summary
 
 
 def usage(seed: int = 0, codes: tuple[int, ...] = (5, 9, 12)) -> CodeUsage:
@@ -75,6 +75,19 @@ def test_summary_shows_both_shares() -> None:
     figure = usage_summary({"lgtok": found}, (1, 3, 4))
     np.testing.assert_allclose(figure.data[0].y, 100 * found.used_, atol=1e-3)
     np.testing.assert_allclose(figure.data[1].y, 100 * found.perplexity_ / [5, 9, 12], atol=1e-3)
+
+
+def test_claims_weigh_perplexity_by_codebook_in_both_halves() -> None:
+    even = CodeUsage().fit([np.arange(4), np.arange(8), np.arange(8), np.arange(8)], (4, 8, 8, 8))
+    lean = CodeUsage().fit([np.arange(4), np.arange(8), np.zeros(9, int), np.zeros(9, int)], (4, 8, 8, 8))
+    rows = usage_claims({"lgtok": even, "mosa": lean}, {"lgtok": "A", "mosa": "B"}).rows
+    assert [row[1:3] for row in rows] == [("1.000", "0.562"), ("1.000", "1.000"), ("1.000", "0.125")]
+    assert rows[0][0] == "A uses its codes more evenly than B, all scales"
+    assert [row[3].split(",")[0].split(":")[0] for row in rows] == ["seen", "not seen", "seen"]
+    alone = CodeUsage().fit([[]], (1,))
+    assert all(
+        "no token" in row[3] for row in usage_claims({"lgtok": alone, "mosa": alone}, {"lgtok": "A", "mosa": "B"}).rows
+    )
 
 
 @pytest.mark.parametrize("sizes", [(1,), (1, 2)])
