@@ -191,5 +191,6 @@ class StoredAnalysis:
         folder.mkdir(parents=True, exist_ok=True)
         np.savez_compressed(folder / f"{self.system}.npz", **{name: getattr(self, name) for name in _ARRAYS})
         head: dict[str, Any] = {"format": FORMAT} | {name: getattr(self, name) for name in _FACTS}
-        text = json.dumps(head | {"clips": [asdict(clip) for clip in self.clips]}, indent=1, ensure_ascii=False)
+        whole = head | {"clips": [asdict(clip) for clip in self.clips]}
+        text = json.dumps(whole, ensure_ascii=False, separators=(",", ":"))
         (folder / f"{self.system}.json").write_text(text + "\n", encoding="utf-8")
