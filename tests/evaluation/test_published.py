@@ -16,7 +16,7 @@ from playground.evaluation.items import ITEMS as WINDOWS
 from playground.evaluation.items import draw_items, measurable, stream
 from playground.evaluation.published import __main__ as command
 from playground.evaluation.published import base, motions
-from playground.evaluation.published.items import ITEMS, LGTOK, compute, results_of, settings_of, up_to_date
+from playground.evaluation.published.items import ITEMS, LGTOK, applies, compute, results_of, settings_of, up_to_date
 from playground.evaluation.run import Order, evaluate
 from playground.evaluation.sweep import guidance_sweep
 from playground.motion.measures import foot_sliding
@@ -164,6 +164,15 @@ def test_bad_input_is_told(place: Place, item: str, changes: dict, words: str) -
                             "evaluators": EVALUATORS} | changes)  # fmt: skip
 
 
+@pytest.mark.parametrize(("item", "system", "there"), [
+    ("evaluation", "mdm", True), ("evaluation", "lgtok-rvq", True), ("strips", "lgtok-rvq", False),
+    ("edits", "mdm", False), ("inference_time", "mdm", True), ("guidance_sweep", "lgtok-notext", True),
+    ("guidance_sweep", "mosa", False), ("free_form", "momask", False), ("levels", "mdm", False),
+])  # fmt: skip
+def test_an_item_applies_to_systems_of_its_kind(item: str, system: str, there: bool) -> None:
+    assert applies(ITEMS[item], system) is there
+
+
 def test_the_flagship_is_measured_in_full() -> None:
     full, less = settings_of(SYSTEM, Path("library")), settings_of("lgtok-mini", Path("library"))
     assert (full.repeats, full.mm_texts, full.mm_samples, full.motions) == (20, 24, 10, 100)
@@ -189,7 +198,7 @@ def test_the_command(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         "strips, lgtok-mini: not trained yet",
     ]
     assert command.main(["edits", "--system", "mdm", "--list"]) == 0
-    assert capsys.readouterr().out == "edits, mdm: only systems with tokens are measured\n"
+    assert capsys.readouterr().out == "edits, mdm: is not measured of a system of this kind\n"
     assert command.main(call) == 0
     assert read_result("strips", SYSTEM, tmp_path) is not None
     capsys.readouterr()

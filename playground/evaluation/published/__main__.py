@@ -50,7 +50,7 @@ def _one(name: str, system: str, options: argparse.Namespace) -> None:
     engine, item = default_engine(), ITEMS[name]
     settings = _settings(system, options)
     if not can_measure(item, system, engine):
-        why = "not trained yet" if applies(item, system) else "only systems with tokens are measured"
+        why = "not trained yet" if applies(item, system) else "is not measured of a system of this kind"
         _say(f"{name}, {system}: {why}")
     elif not options.again and up_to_date(read_result(name, system, options.out), engine, settings):
         _say(f"{name}, {system}: up to date")

@@ -25,14 +25,20 @@ class Item:
     compute: Compute
     draws: bool = True  # is there nothing to measure without a generator?
     tokenless: bool = False  # is there something to measure without a tokenizer?
+    guided: bool = False  # is it about a decoder that reads text, or stands beside one that does?
 
 
 ITEMS: dict[str, Item] = {
     item.name: item
     for item in (
         Item("evaluation", "every metric (Tables 1, 2, 3, Fig 2, perplexity)", measures.evaluation, False, True),
-        Item("guidance_sweep", "quality against g (Fig 5, Table 5)", measures.sweep),
-        Item("free_form", "tokens with and without text, read with and without it (Table 8)", measures.free_form),
+        Item("guidance_sweep", "quality against g (Fig 5, Table 5)", measures.sweep, guided=True),
+        Item(
+            "free_form",
+            "tokens with and without text, read with and without it (Table 8)",
+            measures.free_form,
+            guided=True,
+        ),
         Item("edits", "the benchmark masks (Fig 11)", motions.edits),
         Item("strips", "motions of prompts (Figs 4, 9, 10)", motions.strips, tokenless=True),
         Item("levels", "levels kept against error, energy and coupling (MOGO, SnapMoGen)", levels.levels, False),
@@ -62,9 +68,10 @@ def item_of(name: str) -> Item:
 
 
 def applies(item: Item, system: str) -> bool:
-    """Whether a system is of a kind that has what an item measures: tokens, and a generator where it draws."""
+    """Whether a system is of a kind that has what an item measures: tokens, a generator where it draws, LG-Tok's g."""
     row = row_of(system)
-    return bool((item.tokenless or row.tokenizer) and (row.generator or not item.draws))
+    guided = row.family == "lgtok" or not item.guided
+    return bool((item.tokenless or row.tokenizer) and (row.generator or not item.draws) and guided)
 
 
 def can_measure(item: Item, system: str, engine: Engine) -> bool:
