@@ -62,12 +62,19 @@ def cited_table(item: str) -> Table:
 
 
 def number(value: Estimate, scale: float = 1.0) -> str:
-    """A measured number with its interval, "0.0571 ± 0.0032"; a dash where there is none."""
+    """A measured number with its interval, "0.0571 ± 0.0032"; a dash where there is none.
+
+    Three significant digits, and up to two more places where the interval would be 0 otherwise.
+    """
     if value.mean is None:
         return DASH
-    mean = significant(value.mean * scale)
+    mean, half = significant(value.mean * scale), value.ci95
+    if half is None or not math.isfinite(value.mean) or not math.isfinite(half):
+        return mean
     places = len(mean.partition(".")[2])
-    return mean if value.ci95 is None else f"{mean} ± {value.ci95 * scale:,.{places}f}"
+    wanted = -math.floor(math.log10(half * scale)) if half * scale > 0 else 0
+    places = min(max(places, wanted), places + 2)
+    return f"{value.mean * scale:,.{places}f} ± {half * scale:,.{places}f}"
 
 
 def error_bars(values: Sequence[Estimate]) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def row_of(table, first: str) -> dict[str, str]:
 def test_ablations_stand_beside_the_paper_row_by_row() -> None:
     table = others.runs_table(STORED, "mogo3", ("rfid", "mpjpe_mm"), "mogo_table3")
     row = row_of(table, "1 level")
-    assert (row["FID, paper"], row["rFID, ours"], row["MPJPE, ours, mm"]) == ("0.070", "0.900 ± 0.010", "80.0 ± 0.0")
+    assert (row["FID, paper"], row["rFID, ours"], row["MPJPE, ours, mm"]) == ("0.070", "0.900 ± 0.010", "80.00 ± 0.01")
     assert row_of(table, "3 levels")["rFID, ours"] == "–" and row_of(table, "3 levels")["FID, paper"] == "0.021"
     assert row_of(table, "7 levels")["rFID, ours"] == "not trained yet"
     assert others.runs_table(None, "snap5", ("gfid",)).rows == (("not trained yet", "–"),)
@@ -106,7 +106,7 @@ def test_levels_of_systems_and_of_runs() -> None:
     runs = levels.of_runs(STORED, "mogo3")
     assert [len(one.rows) for one in runs] == [2, 3, 0]
     table = levels.levels_table([*found, *runs])
-    assert ("LG-Tok", "2", "6", "58.0 ± 0.0", "0.333 ± 0.010", "20.0", "0.200") in table.rows
+    assert ("LG-Tok", "2", "6", "58.00 ± 0.01", "0.333 ± 0.010", "20.0", "0.200") in table.rows
     maps = on_dark(levels.between_maps(runs))
     assert [list(line) for line in maps.data[1].z] == [[1.0, 0.25], [0.25, 1.0]] and not levels.between_maps([]).data
     assert not levels.kept_plot(levels.of_runs(None, "mogo3")).data

@@ -48,6 +48,8 @@ def test_significant_digits(value: float, words: str) -> None:
 def test_a_number_with_its_interval() -> None:
     assert number(Estimate(0.76502, 0.00679)) == "0.765 ± 0.007"
     assert number(Estimate(0.931, 0.02), 100) == "93.1 ± 2.0"
+    assert number(Estimate(109.24, 0.18)) == "109.2 ± 0.2" and number(Estimate(433.0, 0.0)) == "433 ± 0"
+    assert number(Estimate(433.0, 1e-9)) == "433.00 ± 0.00"  # two more places at most
     assert number(Estimate(27.7)) == "27.7" and number(Estimate(None)) == "–"
 
 
