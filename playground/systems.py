@@ -120,8 +120,8 @@ SYSTEMS: dict[str, SystemRow] = {
     for row in (
         _ours("lgtok", "LG-Tok", guidance=_GUIDED),
         _ours("lgtok-lite", "LG-Tok lite", guidance=_GUIDED),
-        _ours("lgtok-mid", "LG-Tok mid, 160 tokens", guidance=_GUIDED),
-        _ours("lgtok-mini", "LG-Tok mini, 104 tokens", guidance=_GUIDED),
+        _ours("lgtok-mid", "LG-Tok mid", guidance=_GUIDED),
+        _ours("lgtok-mini", "LG-Tok mini", guidance=_GUIDED),
         _ours("lgtok-notext", "LG-Tok without text"),
         _ours("lgtok-nodrop", "LG-Tok without language drop"),
         _ours("lgtok-rvq", "LG-Tok with MoMask's quantizer", scalewise=False),

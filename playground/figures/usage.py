@@ -50,7 +50,7 @@ def usage_histogram(
 
 def usage_panels(
     usages: Mapping[str, CodeUsage],
-    sizes: Sequence[int],
+    sizes: Sequence[int | None],
     *,
     order: str = "sorted",
     titles: Mapping[str, str] | None = None,
@@ -60,9 +60,9 @@ def usage_panels(
 ) -> go.Figure:
     """A small panel a scale on one frequency axis. One system has the colours of the scales, several have their own.
 
-    usages: system name -> usage, all with the same number of scales; sizes: tokens a scale; titles: system name -> the
-    name to print. customdata of a point begins with "system.scale.code", scale from 1. Several systems are drawn over
-    shares of the codebook, so that codebooks of different size compare.
+    usages: system name -> usage, all with the same number of scales; sizes: tokens a scale, None where they differ;
+    titles: system name -> the name to print. customdata of a point begins with "system.scale.code", scale from 1.
+    Several systems are drawn over shares of the codebook, so that codebooks of different size compare.
     """
     names = list(usages)
     levels = len(sizes)
@@ -70,7 +70,8 @@ def usage_panels(
         raise PlaygroundError(f"usage panels need systems of {levels} scales each, one token count a scale")
     columns = min(columns, levels)
     rows = -(-levels // columns)
-    heads = [f"scale {n + 1} · {size} token{'s' if size > 1 else ''}" for n, size in enumerate(sizes)]
+    tokens = ["" if size is None else f" · {size} token{'s' if size > 1 else ''}" for size in sizes]
+    heads = [f"scale {n + 1}{words}" for n, words in enumerate(tokens)]
     if len(names) == 1:
         heads = [f"{head}<br>{_facts(usages[names[0]], n, 'perpl.')}" for n, head in enumerate(heads)]
     figure = make_subplots(

@@ -14,9 +14,10 @@ from playground.ui.comparing import (
 )
 from playground.ui.drawing import MADE
 from playground.ui.editing import editor_of, opening_motion
+from playground.ui.mapping import first_clip
 from playground.ui.origins import is_clip, is_origin, origin_caption
 from playground.ui.rooms.codebooks import shown_systems
-from playground.ui.rooms.embedding import first_clip, first_systems
+from playground.ui.rooms.embedding import first_systems
 from playground.ui.rooms.guidance import reader_of
 from playground.ui.services import Services
 from playground.ui.state import OWN_FILE, State, controls_of

@@ -34,6 +34,7 @@ MOST_ROWS = 8  # actions that are listed apart
 TOKENS = 80  # tokens a scale that are drawn: every browser draws this many at once, also without a graphics card
 SAMPLE = 1500  # points of a group that distances are taken over
 HEIGHT = 420
+NEIGHBOURS = 4  # that are listed
 COLUMNS = ("system", "id", "scale", "position", "action", "source", "seconds", "tsne_x", "tsne_y", "pca_x", "pca_y")
 
 
@@ -215,3 +216,27 @@ def _title(bundle: Bundle, words: str, each: str) -> str:
     if words == "PCA" and each == "clip":
         return f"PCA, {percent(sum(bundle.explained))} of the variance"
     return words
+
+
+# ---- clips ----------------------------------------------------------------------------------------------------------
+
+
+def first_clip(bundle: Bundle) -> int:
+    """The clip to open with: of the largest action group, the one nearest to the group's middle."""
+    names, counts = np.unique(bundle.actions, return_counts=True)
+    rows = np.flatnonzero(np.asarray(bundle.actions) == names[counts.argmax()])
+    middle = bundle.means[rows].mean(axis=0)
+    return int(rows[np.square(bundle.means[rows] - middle).sum(axis=1).argmin()])
+
+
+def neighbours(bundle: Bundle, row: int, count: int = NEIGHBOURS) -> list[int]:
+    """Rows of the `count` clips nearest to a clip in all dimensions, nearest first."""
+    distance = np.square(bundle.means - bundle.means[row]).sum(axis=1)
+    distance[row] = np.inf
+    return [int(other) for other in np.argsort(distance, kind="stable")[: min(count, len(bundle) - 1)]]
+
+
+def listed(bundle: Bundle, rows: Sequence[int]) -> list[tuple[str, str]]:
+    """Clips as choices: their words, source and length, and their ids."""
+    clips = [bundle.clips[row] for row in rows]
+    return [(f"{c.caption or c.action} · {c.source}, {c.frames / LIMITS.fps:.1f} s", c.id) for c in clips]

@@ -12,6 +12,7 @@ from playground.ui.state import control
 from playground.ui.view import View
 
 NAME = "embedding-map"
+MOST = 4  # maps side by side: more would be stamps
 DRAGS = [("zooms", "off"), ("draws group A", "A"), ("draws group B", "B")]
 RING = """(id) => {
   document.dispatchEvent(new CustomEvent('mtp-pick', { detail: { chart: 'embedding-map', id } }));
@@ -96,7 +97,8 @@ def _choices(
     several = len(systems) > 1
     system = gr.Dropdown(
         [(titles[name], name) for name in systems], value=opening.controls.get("system", []), multiselect=True,
-        label="Systems side by side", elem_id="embedding-system", elem_classes=["mtp-several"], visible=several,
+        max_choices=MOST, label="Systems side by side", elem_id="embedding-system", elem_classes=["mtp-several"],
+        visible=several,
     )  # fmt: skip
     with gr.Row(elem_classes=["mtp-line", "mtp-scales"]):
         each = gr.Radio(EACH, value="clip", label=control(NAME, "each").label, elem_id="embedding-each",

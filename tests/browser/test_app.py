@@ -29,6 +29,11 @@ def shipped(*parts: Path) -> None:
         pytest.skip(f"not shipped with this copy: {', '.join(missing)}")
 
 
+def maps_of_systems() -> list[str]:
+    """The systems whose analysis is shipped."""
+    return [path.stem for path in (ASSETS / "analysis").glob("*.json")]
+
+
 @pytest.fixture(scope="module")
 def app() -> Iterator[str]:
     files = [checkpoint_path(ASSETS, "lgtok", part) for part in ("tokenizer", "generator")]
@@ -58,13 +63,22 @@ def test_a_visitor_meets_the_real_model_in_every_room(visit: Go, app: str) -> No
 
     seen.enter("Embedding map")
     expect(page.locator("#embedding-map .scatterlayer .trace .point").first).to_be_visible()
+    if {"mosa", "momask"} <= set(maps_of_systems()):
+        page.locator("#embedding-system input").click()
+        page.get_by_role("option", name="MoSa", exact=True).click()
+        page.keyboard.press("Escape")
+        expect(page.locator("#embedding-stage .ms-labels")).to_contain_text("MoSa")
+        expect(page.locator("#embedding-system .token")).to_have_count(3)
+        page.locator("#embedding-system .token", has_text="LG-Tok").locator(".token-remove").click()
+        expect(page.locator("#embedding-stage .ms-labels")).not_to_contain_text("LG-Tok")
+        expect(page.locator("#embedding-facts")).to_contain_text("MoSa")
     choice = page.locator("#embedding-near input[type=radio]").first
     choice.check(force=True)
     expect(page.locator("#embedding-stage .ms-badge")).to_contain_text("live")
 
     seen.enter("Codebooks")
     page.get_by_role("button", name="All numbers, scale by scale").click()
-    counted = [name for name in SIDE_BY_SIDE if (ASSETS / "analysis" / f"{name}.json").is_file()]
+    counted = [name for name in SIDE_BY_SIDE if name in maps_of_systems()]
     scales = sum(len(read_bundle(ASSETS / "analysis", name).sizes) for name in counted)
     expect(page.locator("#codebooks-table tbody tr")).to_have_count(scales)
 

@@ -56,6 +56,16 @@ def test_a_like_code_is_of_the_same_scale(do: codebooks.Handlers) -> None:
     assert do.act(kept, event(do="code", code=other[1], number=""))[2] == f"lgtok.4.{other[1]}"
 
 
+def test_other_systems_keep_a_code_of_theirs_and_leave_one_that_is_none(do: codebooks.Handlers) -> None:
+    opened = do.opening.controls["code"]
+    for current, kept in (("lgtok.4.3", "lgtok.4.3"), ("momask.1.2", opened), ("", opened)):
+        *drawn, stage, card, code = do.choose(["lgtok"], "sorted", 10, current)
+        assert drawn == list(do.draw(["lgtok"], "sorted", 10)) and code == kept
+        assert f"Code {kept.rsplit('.', 1)[1]} of scale {kept.split('.')[1]}, LG-Tok" in stage and "Used by" in card
+    with pytest.raises(PlaygroundError, match="at least one"):
+        do.choose([], "sorted", 10, opened)
+
+
 NO_CODES = ["", "lgtok", "lgtok.0.1", "lgtok.11.1", "lgtok.1.128", "x.1.1", None]
 
 

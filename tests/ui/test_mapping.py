@@ -62,7 +62,7 @@ def test_a_token_is_coloured_by_its_place_in_time(bundle: Bundle) -> None:
 def test_several_systems_stand_side_by_side_on_one_kind_of_map(bundle: Bundle) -> None:
     other = replace(bundle, system="lgtok-mini")
     made = mapping.clouds([bundle, other], Shown(("lgtok", "lgtok-mini"), map="pca"), {})
-    assert [cloud.title.split(":")[0] for cloud in made] == ["LG-Tok", "LG-Tok mini, 104 tokens"]
+    assert [cloud.title.split(":")[0] for cloud in made] == ["LG-Tok", "LG-Tok mini"]
     assert all(np.array_equal(cloud.points, bundle.pca) for cloud in made) and made[0].ids == made[1].ids
 
 
@@ -114,6 +114,23 @@ def test_a_new_point_is_placed_and_stays_when_the_map_changes(do: embedding.Hand
     assert [len(trace["x"]) for trace in stars] == [sum(SIZES)] * 2
     do.draw(["lgtok"], "clip", "action", "tsne", "", held)
     assert engine.calls.count("place clip") == 1 and engine.calls.count("tokenize") == 1
+
+
+def test_other_systems_keep_what_is_on_the_stage(do: embedding.Handlers) -> None:
+    settings = (["lgtok"], "clip", "action", "tsne", "c7/5/3", None)
+    drawn, shown = do.draw(*settings), do.put("c7/5/3", ["lgtok"])
+    assert do.choose(*settings)[1:5] == drawn[1:5]
+    assert json.loads(do.choose(*settings)[5])["scene"] == "c7" and do.choose(*settings)[6:] == shown[1:]
+    held = do.place_example("m2", *SETTINGS, None)[0]
+    stage, _, near, current = do.choose(*settings[:5], held)[5:]
+    assert "placed in the map" in stage and [id for _, id in near["choices"]] == ["c3", "c0", "c6"]
+    assert current == "c7/5/3"
+
+
+def test_more_maps_than_fit_are_left_out(do: embedding.Handlers, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"system{n}" for n in range(9)]
+    monkeypatch.setattr(embedding, "map_systems", lambda services: names)
+    assert do._known(names[::-1]) == names[:4]
 
 
 def test_a_generation_is_placed(do: embedding.Handlers, engine: FakeEngine) -> None:

@@ -8,8 +8,8 @@ import pytest
 from playground.analysis.bundle import Bundle
 from playground.errors import PlaygroundError
 from playground.findings import ScaleSet
-from playground.ui import tokenizing
-from playground.ui.rooms import embedding, generate, guidance, tokenize
+from playground.ui import mapping, tokenizing
+from playground.ui.rooms import generate, guidance, tokenize
 from playground.ui.services import Services
 from playground.ui.uploads import Source
 from tests.ui.double import SIZES, FakeEngine, motions, stored_analysis
@@ -108,11 +108,11 @@ def test_neighbours_are_those_a_slow_search_finds(bundle: Bundle) -> None:
     for row in (0, 17, 89):
         distances = [(float(np.linalg.norm(bundle.means[row] - other)), n) for n, other in enumerate(bundle.means)]
         expected = [n for _, n in sorted(distances) if n != row][:4]
-        assert embedding.neighbours(bundle, row) == expected
+        assert mapping.neighbours(bundle, row) == expected
 
 
 def test_the_map_opens_in_the_middle_of_the_largest_group(bundle: Bundle) -> None:
-    row = embedding.first_clip(bundle)
+    row = mapping.first_clip(bundle)
     group = [n for n, action in enumerate(bundle.actions) if action == bundle.actions[row]]
     middle = np.mean([bundle.means[n] for n in group], axis=0)
     assert min(group, key=lambda n: float(np.linalg.norm(bundle.means[n] - middle))) == row

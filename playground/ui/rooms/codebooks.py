@@ -72,7 +72,10 @@ def panels(services: Services, wish: Wish) -> str:
     alike = [bundle for bundle in bundles if len(bundle.sizes) == len(bundles[0].sizes)]
     titles = {bundle.system: row_of(bundle.system).title for bundle in alike}
     usages = {bundle.system: bundle.usage for bundle in alike}
-    figure = usage_panels(usages, alike[0].sizes, order=wish.order, titles=titles)
+    sizes = [
+        found.pop() if len(found) == 1 else None for found in map(set, zip(*(b.sizes for b in alike), strict=True))
+    ]
+    figure = usage_panels(usages, sizes, order=wish.order, titles=titles)
     figure.update_layout(hoverdistance=60)
     return str(figure.to_json())
 
@@ -119,7 +122,7 @@ def _whose(services: Services, wish: Wish) -> tuple[Fact, ...]:
         return ()
     bundles = [services.bundle(name) for name in wish.systems]
     other = [row_of(one.system).title for one in bundles if len(one.sizes) != len(bundles[0].sizes)]
-    card = "The numbers beside this are of the first system chosen; the lines and the table show all."
+    card = "The numbers beside this are of the first system in the list; the lines and the table show all."
     card += f" Panels show as many scales as it has: none for {' and '.join(other)}." if other else ""
     return (Fact(row_of(wish.systems[0]).title, "in numbers and panels", card),)
 
@@ -131,7 +134,8 @@ def code_view(services: Services, system: str, scale: int, code: int) -> View:
     made = engine.prototype(system, scale, code)
     palette = services.palettes(system)[scale - 1]
     like = engine.neighbours(system, scale, code) if len(palette) > 1 else None
-    shown = scene.figure("prototype", f"Code {code} of scale {scale}", made.motion.joints, system, PROTOTYPE)
+    title = f"Code {code} of scale {scale}, {row_of(system).title}"
+    shown = scene.figure("prototype", title, made.motion.joints, system, PROTOTYPE)
     return View(
         stage=scene.payload([shown], scene=f"{system}.{scale}.{code}"),
         controls={"code": f"{system}.{scale}.{code}", "card": code_card(bundle, scale, code, like, palette)},
@@ -144,10 +148,15 @@ def opening_view(services: Services) -> View:
     systems = services.first_few(shown_systems(services))
     first = systems[0]
     wish = Wish(tuple(systems), "sorted", int(control(NAME, "k").default))
-    view = code_view(services, first, 1, int(services.bundle(first).usage.counts_[0].argmax()))
+    view = code_view(services, *place_of(first_code(services, first)))
     charts = {"panels": panels(services, wish), "lines": lines(services, wish)}
     told = {**view.controls, "table": scale_table(services, wish), "system": systems}
     return View(view.stage, facts(services, wish), charts, told, "stored", view.seconds)
+
+
+def first_code(services: Services, system: str) -> str:
+    """The code that the first scale of a system uses most, as "system.scale.code"."""
+    return f"{system}.1.{int(services.bundle(system).usage.counts_[0].argmax())}"
 
 
 def place_of(text: object) -> tuple[str, int, int]:
@@ -170,6 +179,12 @@ class Handlers:
         services, wish = self.services, Wish.checked(self.services, systems, order, k)
         told = facts_line(facts(services, wish))
         return panels(services, wish), lines(services, wish), told, scale_table(services, wish)
+
+    def choose(self, systems: Sequence[str], order: str, k: float, current: str) -> tuple[Any, ...]:
+        """Other systems: what `draw` gives, and a code of one of them on the stage."""
+        drawn, shown = self.draw(systems, order, k), [name for name in shown_systems(self.services) if name in systems]
+        kept = current.rsplit(".", 2)[0] in shown
+        return *drawn, *self.show(current if kept else first_code(self.services, shown[0]))
 
     def show(self, text: object) -> tuple[Any, ...]:
         """A code by its "system.scale.code": the stage, the card, and the same text for the address."""
@@ -223,9 +238,10 @@ def room(services: Services) -> None:
         door = link_door(NAME)
     do = Handlers(services, opening)
     drawn, shown = [plot, over, known, numbers], [stage, card, current]
-    for event in (system.input, order.input, k.release):
-        attach(event, do.draw, [system, order, k], drawn, message, model=False, trigger_mode="always_last")
     look: dict[str, Any] = {"message": message, "stage": NAME, "doing": DOING, "trigger_mode": "always_last"}
+    attach(system.input, do.choose, [system, order, k, current], [*drawn, *shown], **look)
+    for event in (order.input, k.release):
+        attach(event, do.draw, [system, order, k], drawn, message, model=False, trigger_mode="always_last")
     attach(plot.pick, do.pick, [], shown, **look)
     attach(card.act, do.act, [current], shown, **look)
     arrival(door, do.arrive, [], [system, order, k, *drawn, *shown], message, room=NAME, stage=NAME, doing=DOING)

@@ -6,19 +6,30 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import gradio as gr
-import numpy as np
 
 from playground.analysis.bundle import DECODED_NOTE, Bundle, stored_systems
 from playground.errors import PlaygroundError
 from playground.figures import stage as scene
 from playground.limits import LIMITS
+from playground.systems import row_of
 from playground.ui.cards import term
 from playground.ui.errors import Noted, attach
 from playground.ui.facts import Fact
 from playground.ui.layout import panel, room_frame, stage_and_score, words
 from playground.ui.links import arrival, asked, commits, link_door
-from playground.ui.mapping import COLOURS, Shown, about, compare, coordinates, maps
-from playground.ui.mapviews import FORGET, FREE, KEEP_GROUP, RING, SAVE, SELECT, Views, panel_views
+from playground.ui.mapping import (
+    COLOURS,
+    NEIGHBOURS,
+    Shown,
+    about,
+    compare,
+    coordinates,
+    first_clip,
+    listed,
+    maps,
+    neighbours,
+)  # fmt: skip
+from playground.ui.mapviews import FORGET, FREE, KEEP_GROUP, MOST, RING, SAVE, SELECT, Views, panel_views
 from playground.ui.placing import Guest, generated_guest, guest_of, guest_scene
 from playground.ui.previews import preview_card
 from playground.ui.scenes import score, token_facts
@@ -32,7 +43,6 @@ NAME = "embedding-map"
 STAGE = "embedding"
 STAGE_MAP = "embedding-map"  # the chart's element
 LEAD = "Each point is a recorded motion, placed by what its tokens mean. Click one: do neighbours move alike?"
-NEIGHBOURS = 4
 DOING, PLACING = "Decoding its tokens", "Placing it"
 
 
@@ -50,24 +60,9 @@ def map_systems(services: Services) -> list[str]:
     return [system.name for system in services.shipped() if system.name in stored]
 
 
-def first_clip(bundle: Bundle) -> int:
-    """The clip to open with: of the largest action group, the one nearest to the group's middle."""
-    names, counts = np.unique(bundle.actions, return_counts=True)
-    rows = np.flatnonzero(np.asarray(bundle.actions) == names[counts.argmax()])
-    middle = bundle.means[rows].mean(axis=0)
-    return int(rows[np.square(bundle.means[rows] - middle).sum(axis=1).argmin()])
-
-
 def first_systems(services: Services) -> list[str]:
     """Whose maps the room shows at first: two side by side, where two are stored."""
     return services.first_few(map_systems(services))[:2]
-
-
-def neighbours(bundle: Bundle, row: int, count: int = NEIGHBOURS) -> list[int]:
-    """Rows of the `count` clips nearest to a clip in all dimensions, nearest first."""
-    distance = np.square(bundle.means - bundle.means[row]).sum(axis=1)
-    distance[row] = np.inf
-    return [int(other) for other in np.argsort(distance, kind="stable")[: min(count, len(bundle) - 1)]]
 
 
 def show(services: Services, systems: Sequence[str], wanted: str) -> View:
@@ -83,17 +78,29 @@ def show(services: Services, systems: Sequence[str], wanted: str) -> View:
         row = bundle.position(wanted)
         decoded, levels = services.engine().decode(bundle.token_file(row)), bundle.levels(row)
         label = sentence(bundle, row)
-        title = label[:1].upper() + label[1:] if not figures else infos[name].title
-        figures.append(scene.figure(f"clip-{name}", title, decoded.motion.joints, name, DECODED_NOTE))
+        label = label[:1].upper() + label[1:]
+        title, note = (label, DECODED_NOTE) if len(systems) == 1 else (infos[name].title, "decoded from its tokens")
+        note = note if figures or len(systems) == 1 else f"{label}, {note}"
+        figures.append(scene.figure(f"clip-{name}", title, decoded.motion.joints, name, note))
         tracks.append(score(infos[name], decoded.motion.frames, levels, services.palettes(name)))
     first = services.bundle(systems[0])
     row = first.position(wanted)
     return View(
         stage=scene.payload(figures[: LIMITS.max_figures], tracks, scene=wanted),
-        facts=(Fact(f"{first.errors_mm[row]:.0f} mm", "MPJPE", term("clip error")), *token_facts(first.levels(row))),
-        controls={"id": wanted, "near": _listed(first, neighbours(first, row))},
+        facts=(
+            *_whose(infos[systems[0]].title, len(systems)),
+            Fact(f"{first.errors_mm[row]:.0f} mm", "MPJPE", term("clip error")),
+            *token_facts(first.levels(row)),
+        ),
+        controls={"id": wanted, "near": listed(first, neighbours(first, row))},
         seconds=time.perf_counter() - began,
     )
+
+
+def _whose(title: str, count: int) -> tuple[Fact, ...]:
+    """Which of several systems the numbers and the neighbours are of."""
+    card = "The numbers beside this and the neighbours below are of the first system in the list."
+    return (Fact(title, "in numbers and neighbours", card),) if count > 1 else ()
 
 
 def opening_view(services: Services) -> View:
@@ -121,6 +128,16 @@ class Handlers:
         held = replace(held, groups={})
         choices = gr.update(choices=COLOURS[shown.each], value=shown.colour)
         return held, self._maps(held, shown, bundles, current), choices, "", about(bundles[0])
+
+    def choose(
+        self, systems: Sequence[str], each: str, colour: str, kind: str, current: str, held: Session | None
+    ) -> tuple[Any, ...]:
+        """Other systems: the maps, and what was on the stage as these systems have it."""
+        drawn = self.draw(systems, each, colour, kind, current, held)
+        guest = drawn[0].guest
+        if guest is None:
+            return *drawn, *self.put(current, systems)
+        return *drawn, *self._of_guest(guest, self._known(systems)), current
 
     def put(self, wanted: object, systems: Sequence[str]) -> tuple[Any, ...]:
         """A point by its id (for a token "clip/scale/position"): its clip on the stage, its numbers, its neighbours."""
@@ -173,18 +190,18 @@ class Handlers:
     ) -> tuple[Any, ...]:
         shown, bundles = self._shown(systems, each, colour, kind)
         guest: Guest = make(shown.systems[0])
-        placed = guest.on(self.services, shown.systems, "clip")
+        told = self._of_guest(guest, shown.systems)
         held = replace(held or Session(), guest=guest)
-        first, bundle = placed[shown.systems[0]], bundles[0]
-        view = View(
-            guest_scene(self.services, guest, shown.systems), token_facts(guest.results[shown.systems[0]].levels),
-            seconds=first.seconds,
-        )  # fmt: skip
+        return held, self._maps(held, shown, bundles, ""), *told
+
+    def _of_guest(self, guest: Guest, systems: Sequence[str]) -> tuple[Any, ...]:
+        """A new point on the stage, its numbers and its neighbours, as the first of the systems has them."""
+        first, bundle = guest.on(self.services, tuple(systems), "clip")[systems[0]], self.services.bundle(systems[0])
+        told = (*_whose(row_of(systems[0]).title, len(systems)), *token_facts(guest.results[systems[0]].levels))
+        view = View(guest_scene(self.services, guest, tuple(systems)), told, seconds=first.seconds)
         rows = [bundle.position(id) for id in first.nearest if id in bundle.ids][:NEIGHBOURS]
-        near = gr.update(
-            choices=_listed(bundle, rows), value=None, label=f"Nearest in all dimensions to: {guest.title}"
-        )
-        return held, self._maps(held, shown, bundles, ""), view.stage_json(), view.facts_html(), near
+        near = gr.update(choices=listed(bundle, rows), value=None, label=f"Nearest in all dimensions to: {guest.title}")
+        return view.stage_json(), view.facts_html(), near
 
     def csv(self, systems: Sequence[str], each: str) -> tuple[Any, ...]:
         """All coordinates as CSV text."""
@@ -194,7 +211,7 @@ class Handlers:
         """What a link asks for."""
         state = asked(event)
         systems = [name for name in state["system"] or () if name in map_systems(self.services)]
-        systems = systems or first_systems(self.services)
+        systems = systems[:MOST] or first_systems(self.services)
         bundle, wanted = self.services.bundle(systems[0]), state["motion"]
         wanted = wanted if wanted in bundle.ids else bundle.clips[first_clip(bundle)].id
         drawn = self.draw(systems, state["each"], state["colour"], state["map"], wanted, held)
@@ -217,7 +234,7 @@ class Handlers:
         known = [name for name in map_systems(self.services) if name in systems]
         if not known:
             raise PlaygroundError("choose at least one of the systems whose maps are stored")
-        return known
+        return known[:MOST]
 
     def _shown(self, systems: Sequence[str], each: str, colour: str, kind: str) -> tuple[Shown, list[Bundle]]:
         shown = Shown(tuple(self._known(systems)), str(each), str(colour), str(kind)).checked()
@@ -246,10 +263,12 @@ def _bind(do: Handlers, views: Views, session: gr.State, stage: gr.HTML, door: g
     settings = [views.system, views.each, views.colour, views.map, views.current, session]
     drawn = [session, views.plot, views.colour, views.groups, views.about]
     shown = [stage, views.facts, views.near, views.current]
-    for event in (views.system.input, views.each.input, views.colour.input, views.map.input):
-        attach(event, do.draw, settings, drawn, **how)
-        event(None, None, None, js=FORGET, api_visibility="private")
     busy: dict[str, Any] = {**how, "stage": STAGE, "doing": DOING}
+    attach(views.system.input, do.choose, settings, [*drawn, *shown], trigger_mode="always_last", **busy)
+    for event in (views.each.input, views.colour.input, views.map.input):
+        attach(event, do.draw, settings, drawn, **how)
+    for event in (views.system.input, views.each.input, views.colour.input, views.map.input):
+        event(None, None, None, js=FORGET, api_visibility="private")
     clicked = attach(views.plot.pick, do.click, [views.system], shown, trigger_mode="always_last", **busy)
     clicked.then(None, [views.current], None, js=SELECT, api_visibility="private")
     attach(views.near.input, do.step, [views.near, views.system], shown, **busy)
@@ -276,8 +295,3 @@ def _bind(do: Handlers, views: Views, session: gr.State, stage: gr.HTML, door: g
     commits(NAME, {"place": views.example}, views.example.input, forget=("prompt", "selection"))
     commits(NAME, {"place": views.upload}, views.upload.upload, forget=("prompt", "selection"))
     commits(NAME, {"prompt": views.prompt}, views.go.click, views.prompt.submit, forget=("place", "selection"))
-
-
-def _listed(bundle: Bundle, rows: Sequence[int]) -> list[tuple[str, str]]:
-    clips = [bundle.clips[row] for row in rows]
-    return [(f"{c.caption or c.action} · {c.source}, {c.frames / LIMITS.fps:.1f} s", c.id) for c in clips]
