@@ -158,7 +158,7 @@ def files_of(system: str, assets: Path = ASSETS) -> dict[str, str]:
     first = row_of(system).parts[0]
     paths = {"checkpoint": checkpoint_path(assets, system, first)}
     paths["generator"] = checkpoint_path(assets, system, "generator")
-    return {key: _digest(path) for key, path in paths.items()}
+    return {key: digest(path) for key, path in paths.items()}
 
 
 def is_stale(result: Result, assets: Path = ASSETS, judges: Mapping[str, str] | None = None) -> bool:
@@ -169,13 +169,14 @@ def is_stale(result: Result, assets: Path = ASSETS, judges: Mapping[str, str] | 
     told: dict[str, Any] = result.provenance
     drawn, judged = told.get("sampling") or {}, told.get("evaluators") or {}
     if judges is None:
-        judges = {name: _digest(checkpoint_path(ASSETS, "evaluators", name)) for name in judged}
+        judges = {name: digest(checkpoint_path(ASSETS, "evaluators", name)) for name in judged}
     usual = vars(row_of(result.system).sampling)
     pairs = ((told, files_of(result.system, assets)), (drawn, usual), (judged, judges))
     return any(then.get(key, value) != value for then, now in pairs for key, value in now.items())
 
 
-def _digest(path: Path) -> str:
+def digest(path: Path) -> str:
+    """First 12 hexadecimal digits of the sha256 of a file; "" if there is none."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else ""
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from playground.analysis.passes import ClipPass, clip_passes, first_caption, rows_of
+from playground.analysis.results import digest
 from playground.analysis.usage import CodeUsage
 from playground.data.library import Library
 from playground.engine import Engine, check_guidance, default_engine
@@ -17,7 +18,7 @@ from playground.evaluation.items import measurable
 from playground.evaluation.passes import Passes
 from playground.evaluation.repeats import CLIP, MAIN, Plan, Repeat, Table, summarise
 from playground.evaluation.spread import Spread, Tally
-from playground.evaluation.state import State, digest, state_path
+from playground.evaluation.state import State, state_path
 from playground.limits import LIMITS
 from playground.systems import SamplingDefaults, checkpoint_path, row_of
 

@@ -1,6 +1,5 @@
 """What an interrupted evaluation has done so far: a JSON file beside the result, written whole after every repeat."""
 
-import hashlib
 import json
 import os
 from pathlib import Path
@@ -54,8 +53,3 @@ class State:
         if other:
             raise PlaygroundError(f"{path} belongs to an evaluation with another {', '.join(other)}; {advice}")
         return repeats
-
-
-def digest(path: Path) -> str:
-    """First 12 hexadecimal digits of the sha256 of a file; "" if there is none."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else ""
